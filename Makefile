@@ -1,0 +1,71 @@
+# Two commands are all a newcomer needs: `make demo` and `make test`.
+# Both make .venv when it is missing, and install again only when pyproject.toml has changed since.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP_FLAGS := -q --disable-pip-version-check --no-input
+BENCH_OUT := build/bench
+# Two workers on two cores: linear algebra libraries must not start threads of their own.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+# pip inside the environment, or, where the environment could not be given one, the pip that PYTHON has.
+pip_install = if [ -x $(BIN)/pip ]; then $(BIN)/python -m pip install $(PIP_FLAGS) $(1); \
+	else $(PYTHON) -m pip --python $(BIN)/python install $(PIP_FLAGS) $(1); fi
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check bench warm clean
+
+help:
+	@echo "make demo    install, then compare filters and smoothers on a real drive; ends with the report's path"
+	@echo "make test    install everything, then run the whole suite"
+	@echo "make check   lint, format, types and import contracts"
+	@echo "make bench   every benchmark, and the slow tests with all their seeds"
+	@echo "make clean   remove .venv, builds and caches"
+
+demo: $(VENV)/installed warm
+	@$(BIN)/factorlab demo
+
+test: $(VENV)/installed-test warm
+	@.ci/debian-packages chromium
+	@$(ONE_THREAD) $(BIN)/python -m pytest -n 2 $(PYTEST_ARGS)
+
+check: $(VENV)/installed-test
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+# Each script saves its JSON document and, when it misses a "must", exits 3: all run, then the whole fails.
+bench: $(VENV)/installed-test warm
+	@mkdir -p $(BENCH_OUT); missed=; \
+	for script in tests/benchmarks/*.py; do \
+		[ -e "$$script" ] || continue; \
+		name=$$(basename "$$script" .py); echo "== $$name"; \
+		$(ONE_THREAD) $(BIN)/python "$$script" --json > $(BENCH_OUT)/$$name.json || missed="$$missed $$name"; \
+		cat $(BENCH_OUT)/$$name.json; \
+	done; \
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 -m slow --full || missed="$$missed slow-tests"; \
+	if [ -n "$$missed" ]; then echo "missed:$$missed"; exit 3; fi
+
+# Every kernel is compiled once per machine; doing it here keeps the wait out of the first real run.
+warm: | $(VENV)/installed
+	@$(BIN)/python -m sequential.compile
+
+$(VENV)/bin/python:
+	@echo "creating $(VENV)"
+	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || $(PYTHON) -m venv --clear --without-pip $(VENV)
+
+$(VENV)/installed: pyproject.toml | $(VENV)/bin/python
+	@echo "installing factorlab (about 1 GB the first time, a few minutes)"
+	@$(call pip_install,-e .)
+	@touch $@
+
+$(VENV)/installed-test: pyproject.toml | $(VENV)/installed
+	@echo "installing what the tests need (about 1 GB more the first time)"
+	@$(call pip_install,-e '.[test,cloud]')
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,99 @@
+"""What every test may ask for: a seeded generator, seeds for a Monte Carlo, recordings; and no silent skips."""
+
+import hashlib
+import os
+import shutil
+from collections.abc import Generator
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+FEW_SEEDS, ALL_SEEDS = 20, 200
+Report = TypeVar("Report", pytest.TestReport, pytest.CollectReport)
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+# Kernels may compile during an example, so a deadline would measure the compiler.
+settings.register_profile("few", deadline=None, derandomize=True, max_examples=50)
+settings.register_profile("all", deadline=None, derandomize=True, max_examples=1000)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--full", action="store_true", help="run the whole set of seeds (also: FACTORLAB_FULL=1)"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("all" if _is_full(config) else "few")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Asking for recordings or a browser marks the test: `pytest -m "not data and not browser"` needs neither."""
+    for item in items:
+        asked = getattr(item, "fixturenames", ())
+        for fixture, marker in (("data_dir", "data"), ("browser", "browser")):
+            if fixture in asked:
+                item.add_marker(marker)
+
+
+def _is_full(config: pytest.Config) -> bool:
+    return config.getoption("--full") or os.environ.get("FACTORLAB_FULL", "") not in ("", "0")
+
+
+@pytest.fixture
+def rng(request: pytest.FixtureRequest) -> np.random.Generator:
+    """A generator whose seed is the test's own name: the same on every run, machine and worker."""
+    digest = hashlib.blake2s(request.node.nodeid.encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:8], "little"))
+
+
+@pytest.fixture(scope="session")
+def seeds(pytestconfig: pytest.Config) -> range:
+    """Seeds for a Monte Carlo: a few by default, the whole set with --full."""
+    return range(ALL_SEEDS if _is_full(pytestconfig) else FEW_SEEDS)
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The folder of real recordings named by FACTORLAB_DATA."""
+    folder = os.environ.get("FACTORLAB_DATA")
+    if not folder:
+        pytest.skip("needs the real recordings: set FACTORLAB_DATA to their folder (see README, Data)")
+    path = Path(folder).resolve()
+    if not path.is_dir():
+        pytest.skip(f"FACTORLAB_DATA names {path}, which is not a folder")
+    return path
+
+
+@pytest.fixture(scope="session")
+def browser() -> Path:
+    """A Chromium that can render a page without a screen."""
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    if found is None:
+        pytest.skip("needs a browser: install Debian's chromium")
+    return Path(found)
+
+
+# --- no silent skips: where FACTORLAB_NO_SKIP is set, a skip is a failure that gives the skip's reason ---
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    return _forbid_skip((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    return _forbid_skip((yield))
+
+
+def _forbid_skip(report: Report) -> Report:
+    expected_failure = hasattr(report, "wasxfail")
+    if os.environ.get("FACTORLAB_NO_SKIP") and report.skipped and not expected_failure:
+        report.outcome = "failed"
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+        report.longrepr = f"{reason}\nNothing may be skipped while FACTORLAB_NO_SKIP is set."
+    return report
