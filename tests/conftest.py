@@ -1,4 +1,4 @@
-"""What every test may ask for: a seeded generator, seeds for a Monte Carlo, recordings; and no silent skips."""
+"""What every test may ask for: a seeded generator, seeds for a Monte Carlo, recordings, no silent skips."""
 
 import hashlib
 import os
@@ -31,7 +31,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Asking for recordings or a browser marks the test: `pytest -m "not data and not browser"` needs neither."""
+    """Mark what asks for recordings or a browser, so that `-m "not data and not browser"` leaves it out."""
     for item in items:
         asked = getattr(item, "fixturenames", ())
         for fixture, marker in (("data_dir", "data"), ("browser", "browser")):
