@@ -127,7 +127,7 @@ def quaternion_from_matrix(matrix: Array) -> Array:
 
 def _outer_product(matrix: Array) -> Array:
     """Build ``4 q qᵀ`` (..., 4, 4) from rotation matrices (..., 3, 3)."""
-    (a, b, c), (d, e, f), (g, h, i) = ((matrix[..., j, k] for k in range(3)) for j in range(3))
+    (a, b, c), (d, e, f), (g, h, i) = ([matrix[..., j, k] for k in range(3)] for j in range(3))
     rows = [
         [1.0 + a + e + i, h - f, c - g, d - b],
         [h - f, 1.0 + a - e - i, b + d, c + g],

@@ -15,8 +15,9 @@ __all__ = ["SO2", "wrap_angle"]
 def wrap_angle(angle: Array) -> Array:
     """Wrap angles (...), rad, into ]-pi, pi]; angles already inside are returned to the last bit."""
     wrapped = angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
-    # Next to the cut the division may round to a whole turn; the result is then one ulp outside.
-    return np.where(np.abs(wrapped) >= np.pi, np.pi, wrapped)
+    # Next to the cut the division may round to a whole turn, which leaves the result an ulp outside.
+    wrapped = np.where(np.abs(wrapped) >= np.pi, np.pi, wrapped)
+    return np.where(np.abs(angle) < np.pi, angle, wrapped)
 
 
 @final
