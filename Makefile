@@ -4,7 +4,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP_FLAGS := -q --disable-pip-version-check --no-input
+# errors only: pip warns about every index of its configuration that lacks a package
+PIP_FLAGS := -qq --disable-pip-version-check --no-input
 BENCH_OUT := build/bench
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
