@@ -6,6 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # errors only: pip warns about every index of its configuration that lacks a package
 PIP_FLAGS := -qq --disable-pip-version-check --no-input
+EVERYTHING := .[test,cloud]
 BENCH_OUT := build/bench
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
@@ -64,7 +65,7 @@ $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/installed-test: pyproject.toml | $(VENV)/installed
 	@echo "installing what the tests need (about 1 GB more the first time)"
-	@$(call pip_install,-e '.[test,cloud]')
+	@$(call pip_install,-e '$(EVERYTHING)')
 	@touch $@
 
 clean:
