@@ -1,0 +1,81 @@
+"""The nouns of state estimation, and everything recursive.
+
+>>> import sequential as sq
+>>> model = sq.StateSpace(
+...     manifold=sq.Vector(2),
+...     prior=sq.Gaussian([0.0, 1.0], [1.0, 1.0]),
+...     process=sq.ConstantVelocity(0.1),
+...     sensors={"position": sq.LinearSensor([[1.0, 0.0]], 0.25)},
+... )
+>>> log = sq.SensorLog({"position": sq.Stream([0.0, 1.0, 2.0], [0.1, 0.9, 2.2])})
+>>> sq.run(sq.KalmanFilter(), model, log).mean.shape
+(3, 2)
+"""
+
+from sequential.errors import FactorlabError
+from sequential.filters import ExtendedKalmanFilter, IteratedExtendedKalmanFilter, KalmanFilter
+from sequential.history import Innovations, Prediction, Report, Run
+from sequential.log import SensorLog, Stream
+from sequential.manifold import SE2, SE3, SO2, SO3, NavState, Product, Vector
+from sequential.model import Gaussian, Loss, StateSpace
+from sequential.models import (
+    ConstantVelocity,
+    Direction,
+    LinearSensor,
+    Position,
+    Process,
+    RandomWalk,
+    Range,
+    RangeBearing,
+    Sensor,
+    Strapdown,
+    Unicycle,
+    inertial_state,
+)
+from sequential.noise import ImuNoise, diagonal
+from sequential.run import Estimator, run
+from sequential.smoothers import IteratedSmoother, RauchTungStriebel
+from sequential.timeline import Problem, prepare
+
+__all__ = [
+    "SE2",
+    "SE3",
+    "SO2",
+    "SO3",
+    "ConstantVelocity",
+    "Direction",
+    "Estimator",
+    "ExtendedKalmanFilter",
+    "FactorlabError",
+    "Gaussian",
+    "ImuNoise",
+    "Innovations",
+    "IteratedExtendedKalmanFilter",
+    "IteratedSmoother",
+    "KalmanFilter",
+    "LinearSensor",
+    "Loss",
+    "NavState",
+    "Position",
+    "Prediction",
+    "Problem",
+    "Process",
+    "Product",
+    "RandomWalk",
+    "Range",
+    "RangeBearing",
+    "RauchTungStriebel",
+    "Report",
+    "Run",
+    "Sensor",
+    "SensorLog",
+    "StateSpace",
+    "Strapdown",
+    "Stream",
+    "Unicycle",
+    "Vector",
+    "diagonal",
+    "inertial_state",
+    "prepare",
+    "run",
+]

@@ -1,0 +1,216 @@
+"""From a declaration to addresses: every model function becomes a plain C function.
+
+Built-in models are compiled once per machine.  A user's function is compiled where Numba can; where it
+refuses, the kernel calls back into Python for that one function, and `Compiled.interpreted` names it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import ModelError
+from sequential.model import Functions, Plain, StateSpace, evaluate
+from sequential.timeline import sealed
+
+__all__ = ["Compiled", "compiled", "warm_up"]
+
+Array = NDArray[np.float64]
+_DOUBLES = ctypes.POINTER(ctypes.c_double)
+CALLBACK = ctypes.CFUNCTYPE(None, _DOUBLES, _DOUBLES, ctypes.c_double, _DOUBLES, _DOUBLES)
+
+
+@dataclass(eq=False)
+class Compiled:
+    """Tables for the kernels; keeps the compiled functions alive, collects errors of interpreted ones."""
+
+    tables: Any
+    interpreted: list[str] = field(default_factory=list)
+    alive: list[Any] = field(default_factory=list)
+    failures: list[BaseException] = field(default_factory=list)
+
+    def raise_failures(self) -> None:
+        """Raise what an interpreted model function raised while a kernel called it."""
+        if self.failures:
+            first = self.failures[0]
+            self.failures.clear()
+            raise first
+
+    def message(self) -> str:
+        """What interpreting costs, or nothing."""
+        if not self.interpreted:
+            return ""
+        return f"{', '.join(self.interpreted)} could not be compiled and runs in Python, about 100x slower"
+
+
+_known: weakref.WeakKeyDictionary[StateSpace, Compiled] = weakref.WeakKeyDictionary()
+
+
+def compiled(model: StateSpace) -> Compiled:
+    """The tables of a model, made once."""
+    if model not in _known:
+        _known[model] = _lower(model)
+    return _known[model]
+
+
+def _lower(model: StateSpace) -> Compiled:
+    from sequential.kernels.records import ModelTables
+
+    whole = Compiled(None)
+    n, d, f = model.manifold.size, model.manifold.dim, model.process_functions
+    process = [
+        _address(whole, f, raw, f"process {role}", (n, f.inputs, size))
+        for raw, role, size in ((f.value, "step", n), (f.jacobian, "jacobian", d * d), (f.noise, "noise", d * d))
+    ]
+    fused = [_address(whole, f, raw, "", (n, f.inputs, 0)) for raw in (f.advance, f.carry)]
+    sensors = list(model.sensors.values())
+    lowered = list(model.sensor_functions.values())
+    observe, look = [], []
+    for name, sensor, g in zip(model.sensors, sensors, lowered, strict=True):
+        m = sensor.manifold
+        observe.append(_address(whole, g, g.value, f"sensor {name!r}", (n, g.inputs, m.size)))
+        look.append(_address(whole, g, g.jacobian, f"sensor {name!r} jacobian", (n, g.inputs, m.dim * d)))
+    widest = max([s.manifold.dim for s in sensors] or [1])
+    noise_cov = np.zeros((len(sensors), widest, widest))
+    for k, sensor in enumerate(sensors):
+        noise_cov[k, : sensor.manifold.dim, : sensor.manifold.dim] = sensor.noise_cov
+    z_tables = [s.manifold.table() for s in sensors] or [np.zeros((0, 5), dtype=np.int64)]
+    params = [g.params for g in lowered] or [np.zeros(1)]
+    whole.tables = ModelTables(*(sealed(v) if isinstance(v, np.ndarray) else v for v in (
+        model.manifold.table(), n, d, *process, *fused, f.params,
+        _ints(observe), _ints(look), np.concatenate(params), _starts(params),
+        np.ascontiguousarray(np.concatenate(z_tables)), np.append(_starts(z_tables), sum(map(len, z_tables))),
+        _ints([s.manifold.size for s in sensors]), _ints([s.manifold.dim for s in sensors]), noise_cov,
+        np.array([_threshold(s.gate, s.manifold.dim) for s in sensors]),
+        _ints([s.loss.code if s.loss else 0 for s in sensors]),
+        np.array([s.loss.k if s.loss else 0.0 for s in sensors]),
+    )))  # fmt: skip
+    return whole
+
+
+def _ints(values: list[int]) -> NDArray[np.int64]:
+    return np.array(values, dtype=np.int64)
+
+
+def _starts(pieces: list[Any]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum([len(p) for p in pieces])])[: len(pieces)].astype(np.int64)
+
+
+def _threshold(gate: float | None, dim: int) -> float:
+    if gate is None:
+        return float("inf")
+    if not 0.0 < gate < 1.0:
+        msg = f"a gate is a probability between 0 and 1, such as 0.999; got {gate}"
+        raise ModelError(msg)
+    from scipy.special import chdtri
+
+    return float(chdtri(dim, 1.0 - gate))
+
+
+def _address(
+    whole: Compiled, functions: Functions, raw: Any, name: str, sizes: tuple[int, int, int]  # noqa: ANN401
+) -> int:
+    if raw is None:
+        return 0
+    if not isinstance(raw, Plain):
+        return int(_built_in(raw, functions.helpers).address)
+    try:
+        made = _compile_plain(raw, sizes[0], sizes[1])
+    except Exception:  # noqa: BLE001 - Numba refuses in many ways; all of them mean the same here
+        whole.interpreted.append(name)
+        made = _interpret(whole, raw, sizes)
+        whole.alive.append(made)
+        return int(ctypes.cast(made, ctypes.c_void_p).value or 0)
+    whole.alive.append(made)
+    return int(made.address)
+
+
+@cache
+def _built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) -> Any:  # noqa: ANN401
+    from numba import cfunc
+    from numba.extending import register_jitable
+
+    from sequential.kernels.call import MODEL_SIGNATURE
+
+    for helper in helpers:
+        register_jitable(helper)
+    return cfunc(MODEL_SIGNATURE, cache=True, error_model="numpy")(raw)
+
+
+def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:  # noqa: ANN401
+    """A user's function as a C function: arguments become arrays (copies, so that it may write to them)."""
+    from numba import carray, cfunc, njit
+
+    from sequential.kernels.call import MODEL_SIGNATURE
+
+    inner = njit(error_model="numpy")(raw.function)
+    size, adds = raw.size, raw.adds
+    arguments = {"x": f"carray(x, ({n},)).copy()", "u": f"carray(u, ({inputs},)).copy()", "dt": "dt"}
+    given = ", ".join(arguments[name] for name in raw.arguments)
+    kind = type(evaluate_kind(raw, n, inputs))
+    take = "value" if kind in {float, int, np.float64} else "flat[i]"
+    flat = "" if take == "value" else f"    flat = {'value' if kind is np.ndarray else 'np.array(value)'}.ravel()\n"
+    source = (
+        f"def wrapper(x, u, dt, p, out):\n    value = inner({given})\n{flat}"
+        f"    for i in range({size}):\n        out[i] {'+=' if adds else '='} {take}\n"
+    )
+    scope: dict[str, Any] = {"inner": inner, "carray": carray, "np": np}
+    exec(source, scope)  # noqa: S102 - the text above, with nothing of the user's in it
+    return cfunc(MODEL_SIGNATURE, error_model="numpy")(scope["wrapper"])
+
+
+def evaluate_kind(raw: Plain, n: int, inputs: int) -> Any:  # noqa: ANN401
+    """One value of a user's function, to see whether it returns an array, a list or a number."""
+    known = {"x": np.full(n, 0.5), "u": np.zeros(max(inputs, 1)), "dt": 0.01}
+    return raw.function(*(known[name] for name in raw.arguments))
+
+
+def _interpret(whole: Compiled, raw: Plain, sizes: tuple[int, int, int]) -> Any:  # noqa: ANN401
+    n, inputs, size = sizes
+
+    def callback(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ANN401, ARG001
+        view = np.ctypeslib.as_array(out, (size,))
+        try:
+            state = np.ctypeslib.as_array(x, (n,)).copy()
+            given = np.ctypeslib.as_array(u, (inputs,)).copy() if inputs else np.zeros(1)
+            value = evaluate(raw, state, given, dt, np.zeros(1), size)
+        except BaseException as error:  # noqa: BLE001 - raised again once the kernel has returned
+            whole.failures.append(error)
+            view[:] = np.nan
+            return
+        view[:] = view + value if raw.adds else value
+
+    return CALLBACK(callback)
+
+
+def warm_up(progress: Callable[[str], None] = lambda _: None) -> None:
+    """Compile every kernel and every built-in model, so that first runs are quick."""
+    import importlib
+
+    for name in ("extended", "smoothing", "iterated", "unscented"):
+        progress(f"kernel {name}")
+        importlib.import_module(f"sequential.kernels.{name}")
+    for name in ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared"):
+        progress(f"model {name}")
+        module = importlib.import_module(f"sequential.models.{name}")
+        for function in vars(module).values():
+            if _is_raw(function) and function.__module__ == module.__name__:
+                _built_in(function, getattr(module, "HELPERS", ()))
+
+
+def _is_raw(function: Any) -> bool:  # noqa: ANN401
+    code = getattr(function, "__code__", None)
+    return code is not None and code.co_varnames[: code.co_argcount] == ("x", "u", "dt", "p", "out")
+
+
+if __name__ == "__main__":
+    import sys
+
+    warm_up(lambda what: print(f"compiling {what}", file=sys.stderr, flush=True))

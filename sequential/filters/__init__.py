@@ -1,0 +1,6 @@
+"""Recursive filters: settings only; beliefs go in and come out."""
+
+from sequential.filters.extended import ExtendedKalmanFilter, IteratedExtendedKalmanFilter
+from sequential.filters.kalman import KalmanFilter
+
+__all__ = ["ExtendedKalmanFilter", "IteratedExtendedKalmanFilter", "KalmanFilter"]

@@ -1,0 +1,67 @@
+"""The extended Kalman filter and its iterated form: on a manifold, the error-state filter."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from sequential.compile import compiled
+from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.history import Report, Run
+from sequential.timeline import Problem
+
+__all__ = ["ExtendedKalmanFilter", "IteratedExtendedKalmanFilter"]
+
+
+@dataclass(frozen=True, slots=True)
+class ExtendedKalmanFilter:
+    """Linearise at the prediction, update in Joseph's form.
+
+    On a manifold the error lives in the tangent at the estimate (right perturbations), so this is the
+    error-state filter (Solà 2017, Quaternion kinematics for the error-state Kalman filter).  The update
+    equals one Gauss-Newton step from the prediction; the covariance stays in the predicted tangent.
+
+    Parameters
+    ----------
+    keep : keep predictions and transitions, which smoothers need; costs a third of the time
+    """
+
+    keep: bool = False
+    name = "ekf"
+
+    def solve(self, problem: Problem) -> Run:
+        """Filter the whole log."""
+        return filter_problem(problem, self.name, 1, keep=self.keep)
+
+
+@dataclass(frozen=True, slots=True)
+class IteratedExtendedKalmanFilter:
+    """Iterate each update to the maximum a posteriori estimate (Bell and Cathey 1993)."""
+
+    max_iterations: int = 10
+    keep: bool = False
+    name = "iekf"
+
+    def solve(self, problem: Problem) -> Run:
+        """Filter the whole log."""
+        return filter_problem(problem, self.name, max(self.max_iterations, 2), keep=self.keep)
+
+
+def filter_problem(problem: Problem, name: str, iterations: int, *, keep: bool) -> Run:
+    """Run the compiled filter and read its arrays."""
+    from sequential.kernels.extended import Filtered, filter_log
+
+    whole = compiled(problem.model)
+    out = Filtered(*allocate(problem, whole.tables, keep=keep))
+    prior = problem.model.prior
+    began = time.perf_counter()
+    log_likelihood, failed = filter_log(
+        whole.tables, problem.schedule, prior.mean, prior.cov, iterations, int(keep), out
+    )
+    seconds = time.perf_counter() - began
+    whole.raise_failures()
+    require_solved(problem, failed)
+    require_finite(problem, out.mean)
+    rejected = int((out.accepted == 0).sum())
+    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
+    return as_run(problem, out, log_likelihood, report, keep=keep)

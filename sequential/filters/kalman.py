@@ -1,0 +1,41 @@
+"""The Kalman filter of linear models."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sequential.errors import NonlinearModelError
+from sequential.filters.extended import filter_problem
+from sequential.history import Run
+from sequential.model import StateSpace
+from sequential.timeline import Problem
+
+__all__ = ["KalmanFilter"]
+
+
+@dataclass(frozen=True, slots=True)
+class KalmanFilter:
+    """Exact for linear models with Gaussian noise (Kalman 1960); refuses any other model."""
+
+    keep: bool = False
+    name = "kf"
+
+    def solve(self, problem: Problem) -> Run:
+        """Filter the whole log; raises `NonlinearModelError` where the model is not linear."""
+        require_linear(problem.model)
+        return filter_problem(problem, self.name, 1, keep=self.keep)
+
+
+def require_linear(model: StateSpace) -> None:
+    """Raise a sentence that names what is not linear."""
+    if model.manifold.size != model.manifold.dim or any(b.kind != 0 for b in model.manifold.blocks()):
+        culprit = f"the state lives on {model.manifold}"
+    elif not model.process.linear:
+        culprit = f"{type(model.process).__name__} is not declared linear"
+    else:
+        curved = [name for name, sensor in model.sensors.items() if not sensor.linear]
+        if not curved:
+            return
+        culprit = f"sensor {curved[0]!r} is not declared linear"
+    msg = f"KalmanFilter takes linear models only: {culprit}; use ExtendedKalmanFilter()"
+    raise NonlinearModelError(msg)

@@ -1,0 +1,89 @@
+"""From the arrays that a kernel wrote to the `Run` that a user reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from sequential.errors import NotPositiveDefiniteError
+from sequential.history import Innovations, Prediction, Report, Run
+from sequential.timeline import Problem
+
+__all__ = ["allocate", "as_run", "collect_innovations", "require_finite", "require_solved"]
+
+
+def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:  # noqa: ANN401
+    """Empty arrays in the order of the kernels' `Filtered` record."""
+    nodes, readings = len(problem.t), len(problem.reading_t)
+    n, d, widest = tables.n, tables.d, problem.schedule.z.shape[1]
+    kept = nodes if keep else 1
+    return (
+        np.empty((nodes, n)),
+        np.empty((nodes, d, d)),
+        np.empty((kept, n)),
+        np.empty((kept, d, d)),
+        np.empty((kept, d, d)),
+        np.zeros((readings, widest)),
+        np.zeros((readings, widest, widest)),
+        np.zeros(readings, dtype=np.int64),
+    )
+
+
+def require_solved(problem: Problem, failed: int) -> None:
+    """Raise where a kernel met an innovation covariance that is not positive definite."""
+    if failed < 0:
+        return
+    name = list(problem.model.sensors)[problem.schedule.sensor[failed]]
+    when = problem.reading_t[failed] * 1e-9
+    msg = (
+        f"the innovation covariance of {name!r} is not positive definite at {when:.6f} s "
+        f"(reading {problem.reading_row[failed]}): the state has diverged, or noise_cov is far below the "
+        "rounding of the predicted covariance; widen the prior or the noise"
+    )
+    raise NotPositiveDefiniteError(msg)
+
+
+def require_finite(problem: Problem, mean: np.ndarray) -> None:
+    """Raise where an estimate is not finite."""
+    bad = np.flatnonzero(~np.isfinite(mean).all(axis=1))
+    if len(bad):
+        msg = (
+            f"the estimate is no longer finite from {problem.t[bad[0]] * 1e-9:.6f} s on: "
+            "a model function returned NaN or the state diverged"
+        )
+        raise NotPositiveDefiniteError(msg)
+
+
+def collect_innovations(problem: Problem, filtered: Any) -> Mapping[str, Innovations]:  # noqa: ANN401
+    """Innovations of each sensor, by its name."""
+    found = {}
+    for index, (name, sensor) in enumerate(problem.model.sensors.items()):
+        rows = np.flatnonzero(problem.schedule.sensor == index)
+        m = sensor.manifold.dim
+        found[name] = Innovations(
+            problem.reading_t[rows],
+            problem.reading_row[rows],
+            filtered.residual[rows, :m],
+            filtered.residual_cov[rows, :m, :m],
+            filtered.accepted[rows].astype(bool),
+        )
+    return found
+
+
+def as_run(problem: Problem, filtered: Any, log_likelihood: float, report: Report, *, keep: bool) -> Run:  # noqa: ANN401
+    """The `Run` of a recursive filter."""
+    predicted = None
+    if keep:
+        predicted = Prediction(filtered.predicted_mean, filtered.predicted_cov, filtered.transition)
+    return Run(
+        problem.t,
+        filtered.mean,
+        filtered.cov,
+        problem.model.manifold,
+        collect_innovations(problem, filtered),
+        log_likelihood,
+        report,
+        predicted,
+    )

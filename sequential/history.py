@@ -1,0 +1,112 @@
+"""What every estimator returns: a history as arrays with a leading N, and a report of the solve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import DataError
+from sequential.log import nanoseconds
+from sequential.manifold import Manifold
+
+__all__ = ["Innovations", "Prediction", "Report", "Run"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Innovations:
+    """Readings of one sensor beside what was expected of them.
+
+    For a filter: predicted from the past alone.  For a smoother: predicted from all *other* readings
+    (leave-one-out, in closed form), so that in both cases `nis` is χ² with m degrees of freedom.
+    """
+
+    t: Ints  # (M,) ns
+    row: Ints  # (M,) row in the stream
+    residual: Array  # (M, m) measured minus expected, in the tangent of the measurement
+    cov: Array  # (M, m, m) covariance of the residual
+    accepted: NDArray[np.bool_]  # (M,) False where a gate rejected the reading
+    kind: str = "filter"  # or "leave-one-out"
+
+    def nis(self) -> Array:
+        """(M,) normalised innovation squared, rᵀ S⁻¹ r, of every reading, gated or not."""
+        solved = np.linalg.solve(self.cov, self.residual[..., None])[..., 0]
+        return np.einsum("ni,ni->n", self.residual, solved)
+
+    def whitened(self) -> Array:
+        """(M, m) residuals multiplied by the inverse Cholesky factor of their covariance."""
+        lower = np.linalg.cholesky(self.cov)
+        return np.linalg.solve(lower, self.residual[..., None])[..., 0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """Belief at each node before its readings, and the Jacobian of the way there from the node before."""
+
+    mean: Array  # (N, n)
+    cov: Array  # (N, d, d)
+    transition: Array  # (N, d, d); entry 0 is the identity
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """How a solve went; failure is data as well."""
+
+    estimator: str
+    converged: bool = True
+    iterations: int = 1
+    seconds: float = 0.0
+    cost: float = float("nan")  # half the sum of squared whitened residuals, where the estimator has one
+    message: str = ""
+    rejected: int = 0
+    details: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """Estimates at the nodes of a problem.
+
+    `cov` is in the tangent at `mean` (the chart of `manifold`, which is GTSAM's).
+    """
+
+    t: Ints  # (N,) ns
+    mean: Array  # (N, n)
+    cov: Array  # (N, d, d)
+    manifold: Manifold
+    innovations: Mapping[str, Innovations]
+    log_likelihood: float
+    report: Report
+    predicted: Prediction | None = None
+
+    def __post_init__(self) -> None:
+        for values in (self.t, self.mean, self.cov):
+            values.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def index(self, t: NDArray[np.generic]) -> Ints:
+        """Rows of the nodes at the given times; raises `DataError` where there is none."""
+        wanted = np.atleast_1d(nanoseconds(t))
+        rows = np.clip(np.searchsorted(self.t, wanted), 0, len(self.t) - 1)
+        missing = np.flatnonzero(self.t[rows] != wanted)
+        if len(missing):
+            msg = (
+                f"no estimate at {wanted[missing[0]] * 1e-9:.6f} s (and {len(missing) - 1} more times); "
+                "ask for them with run(…, at=times)"
+            )
+            raise DataError(msg)
+        return rows
+
+    def part(self, name: str) -> Array:
+        """(N, size) one named part of a product state."""
+        return self.mean[:, self.manifold.storage(name)]  # type: ignore[attr-defined]
+
+    def sigmas(self) -> Array:
+        """(N, d) standard deviations along the tangent directions."""
+        return np.sqrt(np.diagonal(self.cov, axis1=1, axis2=2))

@@ -1,0 +1,42 @@
+"""Compiled loops over whole logs.  Importing a module here loads Numba; only `run` does so.
+
+Every kernel has an explicit signature and a disk cache, so it is compiled once per machine.  The cache
+folder carries a digest of the sources that are inlined into others, because Numba itself looks only at
+the file in which a function stands.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+import numba
+
+__all__ = ["cache_folder"]
+
+INLINED = ("kernels/call.py", "kernels/matrices.py", "kernels/charts.py", "kernels/poses.py", "kernels/sensing.py")
+
+
+def cache_folder() -> Path:
+    """Where compiled code is kept: NUMBA_CACHE_DIR, else the user's cache, else the temporary folder."""
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(given)
+    package = Path(__file__).parent.parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in [*(package / name for name in INLINED), *sorted((package / "models").glob("*.py"))]:
+        digest.update(source.read_bytes() if source.exists() else b"")
+    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    for folder in (base, Path(tempfile.gettempdir())):
+        cache = folder / "factorlab" / f"kernels-{digest.hexdigest()[:16]}"
+        try:
+            cache.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(cache, os.W_OK):
+            return cache
+    return Path(tempfile.mkdtemp(prefix="factorlab-kernels-"))
+
+
+numba.config.CACHE_DIR = str(cache_folder())

@@ -1,0 +1,75 @@
+"""A Kalman update of a mean and a covariance by one reading, in Joseph's form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sequential.kernels.matrices import (
+    add_product_nt,
+    cholesky,
+    multiply,
+    multiply_nt,
+    solve_lower,
+    solve_lower_transposed,
+    symmetrise,
+)
+
+__all__ = ["LOG_TWO_PI", "gain_and_innovation", "joseph"]
+
+LOG_TWO_PI = math.log(2.0 * math.pi)
+
+
+@njit(cache=True, error_model="numpy")
+def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):  # type: ignore[no-untyped-def]
+    """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹; returns (NIS, log det S), NIS negative if S is not positive definite.
+
+    `cross` holds H P (m, d) and `gain` Kᵀ (m, d); `lower` the Cholesky factor of S.
+    """
+    multiply(h, p, cross, m, d, d)
+    multiply_nt(cross, h, innovation_cov, m, d, m)
+    for i in range(m):
+        for j in range(m):
+            innovation_cov[i, j] += noise[i, j] / weight
+    symmetrise(innovation_cov, m)
+    if cholesky(innovation_cov, lower, m, False) > 0:
+        return -1.0, 0.0
+    for i in range(m):
+        for j in range(d):
+            gain[i, j] = cross[i, j]
+    solve_lower(lower, gain, m, d)
+    solve_lower_transposed(lower, gain, m, d)
+    nis, log_det = 0.0, 0.0
+    white = np.empty(m)
+    for i in range(m):
+        s = residual[i]
+        for k in range(i):
+            s -= lower[i, k] * white[k]
+        white[i] = s / lower[i, i]
+        nis += white[i] * white[i]
+        log_det += 2.0 * math.log(lower[i, i])
+    return nis, log_det
+
+
+@njit(cache=True, error_model="numpy")
+def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):  # type: ignore[no-untyped-def]
+    """P <- (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; symmetric for any gain."""
+    for i in range(d):
+        for j in range(d):
+            s = 1.0 if i == j else 0.0
+            for k in range(m):
+                s -= gain[k, i] * h[k, j]
+            left[i, j] = s
+    multiply(left, p, work, d, d, d)
+    multiply_nt(work, left, p, d, d, d)
+    for i in range(d):
+        for j in range(m):
+            s = 0.0
+            for k in range(m):
+                s += gain[k, i] * noise[k, j]
+            scaled[i, j] = s / weight
+            left[i, j] = gain[j, i]
+    add_product_nt(scaled, left, p, d, m, d)
+    symmetrise(p, d)

@@ -1,0 +1,139 @@
+"""One Gauss-Newton iteration on the chain, as a linear filter about the current trajectory.
+
+The unknowns are tangent steps δ_k at the current states x_k.  The prior, each process step and each reading
+is linearised there; the forward pass below and the backward pass of `smoothing` then solve the least-squares
+problem of the whole chain exactly (Bell 1994, The iterated Kalman smoother as a Gauss-Newton method).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, types
+
+from sequential.kernels.belief import gain_and_innovation, joseph
+from sequential.kernels.call import call
+from sequential.kernels.charts import transport
+from sequential.kernels.extended import predict
+from sequential.kernels.matrices import multiply, multiply_nt, push_covariance
+from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
+from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
+
+__all__ = ["LINEARISED", "Linearised", "filter_steps"]
+
+
+class Linearised(NamedTuple):
+    """What the forward pass writes: beliefs about δ."""
+
+    mean: Any  # (K, d)
+    cov: Any  # (K, d, d)
+    predicted_mean: Any  # (K, d)
+    predicted_cov: Any  # (K, d, d)
+    transition: Any  # (K, d, d)
+
+
+_f2, _f3 = types.float64[:, ::1], types.float64[:, :, ::1]
+LINEARISED = types.NamedTuple([_f2, _f3, _f2, _f3, _f3], Linearised)
+
+
+@njit(cache=True, error_model="numpy")
+def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, expected, residual):  # type: ignore[no-untyped-def]
+    """Update the belief about δ by one reading linearised at the trajectory; robust weights from its residual."""
+    s = plan.sensor[reading]
+    m, d = model.z_dim[s], model.d
+    h, flat, cross, gain, innovation_cov, lower, scaled = update
+    noise = model.noise_cov[s]
+    measure(model, plan, reading, trajectory, at, expected, residual)
+    sensor_jacobian(model, plan, reading, trajectory, at, expected, flat, h)
+    weight = 1.0
+    if model.loss[s] != 0:
+        weight = loss_weight(model.loss[s], model.loss_k[s], whitened_square(noise, residual, m, lower))
+    for i in range(m):
+        for k in range(d):
+            residual[i] -= h[i, k] * mean[k]
+    nis, _ = gain_and_innovation(cov, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain)
+    if nis < 0.0:
+        return -1
+    for i in range(d):
+        for k in range(m):
+            mean[i] += gain[k, i] * residual[k]
+    joseph(cov, h, gain, noise, weight, m, d, work[0], work[1], scaled)
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def whitened_square(noise, residual, m, lower):  # type: ignore[no-untyped-def]
+    """Residualᵀ R⁻¹ residual by forward substitution."""
+    total = 0.0
+    white = np.empty(m)
+    for j in range(m):
+        for i in range(j, m):
+            s = noise[i, j]
+            for k in range(j):
+                s -= lower[i, k] * lower[j, k]
+            lower[i, j] = s ** 0.5 if i == j else s / lower[j, j]
+    for i in range(m):
+        s = residual[i]
+        for k in range(i):
+            s -= lower[i, k] * white[k]
+        white[i] = s / lower[i, i]
+        total += white[i] * white[i]
+    return total
+
+
+@njit(types.int64(MODEL, SCHEDULE, f1, f2, f2, LINEARISED), cache=True, error_model="numpy")
+def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):  # type: ignore[no-untyped-def]
+    """Linearise about the trajectory (K, n) and filter; returns -1, or the reading where S was indefinite."""
+    n, d, blocks = model.n, model.d, len(model.table)
+    nodes, widest = len(plan.reading_ptr) - 1, plan.z.shape[1]
+    belief = np.empty(n + d * d)
+    x, q = belief[:n], belief[n:].reshape((d, d))
+    phi, turn, inverse = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
+    work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
+    update = (
+        np.empty((widest, d)), np.empty(widest * d), np.empty((widest, d)), np.empty((widest, d)),
+        np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
+    )  # fmt: skip
+    expected, residual = np.empty(widest), np.empty(widest)
+    states = trajectory.reshape(-1)
+    mean, cov, e, step = np.zeros(d), np.empty((d, d)), np.empty(d), np.empty(d)
+    for node in range(nodes):
+        if node == 0:
+            x[:] = prior_mean
+            cov[:, :] = prior_cov
+            transport(model.table, blocks, d, x, 0, states, 0, e, turn, inverse)
+            push_covariance(inverse, cov, work[0], work[1], d)
+            phi[:, :] = turn
+        else:
+            x[:] = trajectory[node - 1]
+            q[:, :] = 0.0
+            phi[:, :] = 0.0
+            for i in range(d):
+                phi[i, i] = 1.0
+            predict(model, plan, node, belief, x, q, phi, 1, work)
+            transport(model.table, blocks, d, x, 0, states, node * n, e, turn, inverse)
+            push_covariance(inverse, q, work[0], work[1], d)
+            multiply(turn, phi, work[0], d, d, d)
+            phi[:, :] = work[0]
+            multiply(phi, cov, work[0], d, d, d)
+            multiply_nt(work[0], phi, cov, d, d, d)
+            for i in range(d):
+                for j in range(i + 1):
+                    s = 0.5 * (cov[i, j] + cov[j, i]) + q[i, j]
+                    cov[i, j], cov[j, i] = s, s
+        for i in range(d):
+            step[i] = 0.0
+            for k in range(d):
+                step[i] += phi[i, k] * mean[k] - inverse[i, k] * e[k]
+        mean[:] = step
+        out.predicted_mean[node] = mean
+        out.predicted_cov[node] = cov
+        out.transition[node] = phi
+        for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
+            absorbed = absorb_step(model, plan, reading, states, node * n, mean, cov, update, work, expected, residual)
+            if absorbed < 0:
+                return reading
+        out.mean[node] = mean
+        out.cov[node] = cov
+    return -1

@@ -1,0 +1,134 @@
+"""Small dense matrices, by hand: for these sizes a BLAS call costs ten times the work it does."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+__all__ = [
+    "add_product_nt",
+    "cholesky",
+    "multiply",
+    "multiply_nt",
+    "push_covariance",
+    "solve_lower",
+    "solve_lower_transposed",
+    "symmetrise",
+]
+
+TINY = 1e-13  # a pivot below this share of its diagonal has been lost to rounding
+
+
+@njit(cache=True, error_model="numpy")
+def multiply(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
+    """out (n, p) = a (n, m) b (m, p); zeros of a are skipped, which pays for a sparse Jacobian."""
+    for i in range(n):
+        for j in range(p):
+            out[i, j] = 0.0
+        for k in range(m):
+            s = a[i, k]
+            if s != 0.0:
+                for j in range(p):
+                    out[i, j] += s * b[k, j]
+
+
+@njit(cache=True, error_model="numpy")
+def multiply_nt(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
+    """out (n, p) = a (n, m) bᵀ, with b (p, m)."""
+    for i in range(n):
+        for j in range(p):
+            s = 0.0
+            for k in range(m):
+                s += a[i, k] * b[j, k]
+            out[i, j] = s
+
+
+@njit(cache=True, error_model="numpy")
+def add_product_nt(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
+    """out (n, p) += a (n, m) bᵀ, with b (p, m)."""
+    for i in range(n):
+        for j in range(p):
+            s = 0.0
+            for k in range(m):
+                s += a[i, k] * b[j, k]
+            out[i, j] += s
+
+
+@njit(cache=True, error_model="numpy")
+def symmetrise(a, n):  # type: ignore[no-untyped-def]
+    """a <- (a + aᵀ) / 2."""
+    for i in range(n):
+        for j in range(i):
+            s = 0.5 * (a[i, j] + a[j, i])
+            a[i, j] = s
+            a[j, i] = s
+
+
+@njit(cache=True, error_model="numpy")
+def push_covariance(f, p, work, flipped, d):  # type: ignore[no-untyped-def]
+    """p <- F p Fᵀ for symmetric p, as F (F p)ᵀ: both products skip the zeros of F."""
+    multiply(f, p, work, d, d, d)
+    for i in range(d):
+        for j in range(d):
+            flipped[i, j] = work[j, i]
+    multiply(f, flipped, p, d, d, d)
+    symmetrise(p, d)
+
+
+@njit(cache=True, error_model="numpy")
+def cholesky(a, lower, n, lenient):  # type: ignore[no-untyped-def]
+    """Lower factor of a; returns the number of pivots lost to rounding.
+
+    A lost pivot is an error to most callers.  With `lenient`, its column becomes zero, which makes the
+    solves below act as a pseudo-inverse: a static state whose variance has vanished needs that.
+    """
+    lost = 0
+    for j in range(n):
+        s = a[j, j]
+        for k in range(j):
+            s -= lower[j, k] * lower[j, k]
+        if not s > TINY * a[j, j]:
+            lost += 1
+            if not lenient:
+                return lost
+            for i in range(j, n):
+                lower[i, j] = 0.0
+            continue
+        pivot = math.sqrt(s)
+        lower[j, j] = pivot
+        for i in range(j + 1, n):
+            s = a[i, j]
+            for k in range(j):
+                s -= lower[i, k] * lower[j, k]
+            lower[i, j] = s / pivot
+    for i in range(n):
+        for j in range(i + 1, n):
+            lower[i, j] = 0.0
+    return lost
+
+
+@njit(cache=True, error_model="numpy")
+def solve_lower(lower, b, n, p):  # type: ignore[no-untyped-def]
+    """b (n, p) <- L⁻¹ b; rows of lost pivots become zero."""
+    for i in range(n):
+        pivot = lower[i, i]
+        for k in range(i):
+            s = lower[i, k]
+            for j in range(p):
+                b[i, j] -= s * b[k, j]
+        for j in range(p):
+            b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def solve_lower_transposed(lower, b, n, p):  # type: ignore[no-untyped-def]
+    """b (n, p) <- L⁻ᵀ b; rows of lost pivots become zero."""
+    for i in range(n - 1, -1, -1):
+        pivot = lower[i, i]
+        for k in range(i + 1, n):
+            s = lower[k, i]
+            for j in range(p):
+                b[i, j] -= s * b[k, j]
+        for j in range(p):
+            b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0

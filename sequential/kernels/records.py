@@ -1,0 +1,50 @@
+"""The records that kernels take, and their Numba types."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba import types
+
+from sequential.timeline import Schedule
+
+__all__ = ["MODEL", "SCHEDULE", "ModelTables", "f1", "f2", "f3", "i1"]
+
+f1 = types.Array(types.float64, 1, "C", readonly=True)
+f2 = types.Array(types.float64, 2, "C", readonly=True)
+f3 = types.Array(types.float64, 3, "C", readonly=True)
+i1 = types.Array(types.int64, 1, "C", readonly=True)
+i2 = types.Array(types.int64, 2, "C", readonly=True)
+
+
+class ModelTables(NamedTuple):
+    """A `StateSpace` as addresses and numbers; see `sequential.compile`."""
+
+    table: Any  # (B, 5) blocks of the state's manifold
+    n: int  # storage
+    d: int  # tangent
+    step: int  # addresses of the process; 0 where a function is absent
+    jacobian: int
+    noise: int
+    advance: int
+    carry: int
+    params: Any
+    observe: Any  # (S,) addresses of the sensors
+    observe_jacobian: Any
+    sensor_params: Any  # all sensors' numbers, one after the other
+    sensor_params_at: Any  # (S,) where each begins
+    z_table: Any  # blocks of the measurements' manifolds
+    z_first: Any  # (S+1,) rows of z_table
+    z_size: Any  # (S,) storage of a measurement
+    z_dim: Any  # (S,) tangent of a measurement
+    noise_cov: Any  # (S, m, m)
+    gate: Any  # (S,) largest NIS that is accepted; infinity without a gate
+    loss: Any  # (S,) 0 none, 1 Huber, 2 Cauchy
+    loss_k: Any  # (S,)
+
+
+_int = types.int64
+MODEL = types.NamedTuple(
+    [i2, _int, _int, _int, _int, _int, _int, _int, f1, i1, i1, f1, i1, i2, i1, i1, i1, f3, f1, i1, f1], ModelTables
+)
+SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2], Schedule)

@@ -1,0 +1,96 @@
+"""What filters and smoothers share: one step of the process, one look through a sensor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sequential.kernels.call import call
+from sequential.kernels.charts import local, retract
+
+__all__ = ["loss_weight", "measure", "process_jacobian", "sensor_jacobian"]
+
+STEP = 1e-6  # of central differences, in the units of the tangent
+CAUCHY = 2
+
+
+@njit(cache=True, error_model="numpy")
+def process_jacobian(model, x, u, row, dt, after, out):  # type: ignore[no-untyped-def]
+    """F (d, d) of the step from x, declared or differenced; `after` is the state after the step."""
+    width = u.shape[1]
+    if model.jacobian != 0:
+        call(model.jacobian, x, 0, u, row * width, dt, model.params, 0, out, 0)
+        return
+    d, blocks = model.d, len(model.table)
+    xi, ahead, moved = np.zeros(d), np.empty(model.n), np.empty(model.n)
+    gone, came = np.empty(d), np.empty(d)
+    for j in range(d):
+        xi[j] = STEP
+        retract(model.table, 0, blocks, x, 0, xi, 0, moved, 0)
+        call(model.step, moved, 0, u, row * width, dt, model.params, 0, ahead, 0)
+        local(model.table, 0, blocks, after, 0, ahead, 0, gone, 0)
+        xi[j] = -STEP
+        retract(model.table, 0, blocks, x, 0, xi, 0, moved, 0)
+        call(model.step, moved, 0, u, row * width, dt, model.params, 0, ahead, 0)
+        local(model.table, 0, blocks, after, 0, ahead, 0, came, 0)
+        xi[j] = 0.0
+        for i in range(d):
+            out[i, j] = (gone[i] - came[i]) / (2.0 * STEP)
+
+
+@njit(cache=True, error_model="numpy")
+def measure(model, plan, reading, x, x_at, expected, residual):  # type: ignore[no-untyped-def]
+    """Expected measurement at x, and residual = local(expected, z)."""
+    s = plan.sensor[reading]
+    width, size = plan.context.shape[1], plan.z.shape[1]
+    call(
+        model.observe[s], x, x_at, plan.context, reading * width, 0.0,
+        model.sensor_params, model.sensor_params_at[s], expected, 0,
+    )  # fmt: skip
+    z = plan.z.reshape(-1)
+    local(model.z_table, model.z_first[s], model.z_first[s + 1], expected, 0, z, reading * size, residual, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):  # type: ignore[no-untyped-def]
+    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` holds m·d numbers."""
+    s = plan.sensor[reading]
+    m, d, width = model.z_dim[s], model.d, plan.context.shape[1]
+    at = model.sensor_params_at[s]
+    if model.observe_jacobian[s] != 0:
+        call(
+            model.observe_jacobian[s], x, x_at, plan.context, reading * width, 0.0,
+            model.sensor_params, at, flat, 0,
+        )  # fmt: skip
+        for i in range(m):
+            for j in range(d):
+                out[i, j] = flat[i * d + j]
+        return
+    blocks, first, last = len(model.table), model.z_first[s], model.z_first[s + 1]
+    xi, moved, seen = np.zeros(d), np.empty(model.n), np.empty(model.z_size[s])
+    gone, came = np.empty(m), np.empty(m)
+    for j in range(d):
+        xi[j] = STEP
+        retract(model.table, 0, blocks, x, x_at, xi, 0, moved, 0)
+        call(model.observe[s], moved, 0, plan.context, reading * width, 0.0, model.sensor_params, at, seen, 0)
+        local(model.z_table, first, last, expected, 0, seen, 0, gone, 0)
+        xi[j] = -STEP
+        retract(model.table, 0, blocks, x, x_at, xi, 0, moved, 0)
+        call(model.observe[s], moved, 0, plan.context, reading * width, 0.0, model.sensor_params, at, seen, 0)
+        local(model.z_table, first, last, expected, 0, seen, 0, came, 0)
+        xi[j] = 0.0
+        for i in range(m):
+            out[i, j] = (gone[i] - came[i]) / (2.0 * STEP)
+
+
+@njit(cache=True, error_model="numpy")
+def loss_weight(kind, k, squared):  # type: ignore[no-untyped-def]
+    """Weight of a residual whose whitened squared norm is given; 1 without a loss."""
+    if kind == 0:
+        return 1.0
+    if kind == CAUCHY:
+        return k * k / (k * k + squared)
+    r = math.sqrt(squared)
+    return 1.0 if r <= k else k / r

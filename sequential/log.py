@@ -1,0 +1,218 @@
+"""A sensor log: named streams of stamped readings, checked at the door and never changed afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sequential.errors import MissingStreamError, NotFiniteError, ShapeError, TimeOrderError
+
+__all__ = ["SensorLog", "Stream", "nanoseconds", "seconds"]
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+NS = 1_000_000_000
+
+
+def nanoseconds(t: ArrayLike) -> Stamps:
+    """Stamps as int64 nanoseconds: integers are taken as they are, floats are seconds.  Shape is kept."""
+    stamps = np.asarray(t)
+    if np.issubdtype(stamps.dtype, np.integer):
+        return stamps.astype(np.int64)
+    values = stamps.astype(np.float64)
+    if not np.all(np.isfinite(values)):
+        at = int(np.flatnonzero(~np.isfinite(values))[0])
+        msg = f"stamp {at} is {values.flat[at]}; every stamp must be a finite number of seconds"
+        raise NotFiniteError(msg)
+    whole = np.floor(values)  # in two parts: one product would lose the last digits of Unix seconds
+    return whole.astype(np.int64) * NS + np.round((values - whole) * NS).astype(np.int64)
+
+
+def seconds(t: ArrayLike, origin: int = 0) -> Array:
+    """Nanosecond stamps as float seconds since `origin` (ns)."""
+    return (np.asarray(t, dtype=np.int64) - origin).astype(np.float64) * 1e-9
+
+
+def frozen(values: ArrayLike) -> Array:
+    """Own, contiguous, read-only copy."""
+    own = np.array(values, dtype=np.float64, order="C")
+    own.flags.writeable = False
+    return own
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stream:
+    """Readings of one sensor.
+
+    Parameters
+    ----------
+    t : (N,) int64 nanoseconds, or floats in seconds
+    values : (N, m) or (N,), SI units
+    context : (N, c), what is known about each reading, such as the index of the landmark that was seen
+    covers : for a stream that drives a process: does a sample hold for the interval `"after"` its
+        stamp (until the next one) or `"before"` it (since the previous one)?
+    """
+
+    t: Stamps
+    values: Array
+    context: Array | None = None
+    covers: Literal["after", "before"] = "after"
+
+    def __post_init__(self) -> None:
+        t = np.atleast_1d(nanoseconds(self.t)).copy()
+        t.flags.writeable = False
+        values = frozen(self.values)
+        values = values[:, None] if values.ndim == 1 else values
+        if values.ndim != 2 or len(values) != len(t):
+            msg = f"{len(t)} stamps need values of shape ({len(t)}, m), got {np.shape(self.values)}"
+            raise ShapeError(msg)
+        object.__setattr__(self, "t", t)
+        object.__setattr__(self, "values", values)
+        if self.context is not None:
+            context = frozen(self.context)
+            context = context[:, None] if context.ndim == 1 else context
+            if context.ndim != 2 or len(context) != len(t):
+                msg = f"{len(t)} stamps need a context of shape ({len(t)}, c), got {np.shape(self.context)}"
+                raise ShapeError(msg)
+            object.__setattr__(self, "context", context)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def select(self, rows: NDArray[Any]) -> Stream:
+        """The readings that a mask or an index array names."""
+        context = None if self.context is None else self.context[rows]
+        return Stream(self.t[rows], self.values[rows], context, self.covers)
+
+    def keys(self) -> NDArray[np.float64]:
+        """(N, c) what tells readings of equal stamp apart: the context, or nothing."""
+        return np.zeros((len(self), 0)) if self.context is None else self.context
+
+    def repeated(self) -> NDArray[np.bool_]:
+        """(N,) True where stamp and context repeat an earlier reading's."""
+        table = np.column_stack([self.t - (self.t[0] if len(self) else 0), self.keys()])
+        _, first = np.unique(table, axis=0, return_index=True)
+        repeat = np.ones(len(self), dtype=bool)
+        repeat[first] = False
+        return repeat
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SensorLog(Mapping[str, Stream]):
+    """Named streams of one recording; `log["gps"].values` is (N, m).
+
+    Building one checks every stream: finite values, stamps that do not go backwards, no reading twice.
+    Raises `NotFiniteError`, `TimeOrderError` or `ShapeError`, each naming stream, sample and remedy.
+    `SensorLog.unchecked` skips the checks, so that a messy recording can be `sorted()` or made `unique()`.
+    """
+
+    streams: Mapping[str, Stream]
+    name: str = "log"
+    checked: bool = field(default=True, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "streams", dict(self.streams))
+        if self.checked:
+            for name, stream in self.streams.items():
+                check_stream(name, stream)
+
+    @classmethod
+    def unchecked(cls, streams: Mapping[str, Stream], name: str = "log") -> SensorLog:
+        """A log as it came, to be mended by `sorted()`, `finite()` or `unique()`."""
+        return cls(streams, name, checked=False)
+
+    def __getitem__(self, name: str) -> Stream:
+        if name not in self.streams:
+            msg = f"log {self.name!r} has no stream {name!r}; it has {', '.join(sorted(self.streams)) or 'none'}"
+            raise MissingStreamError(msg)
+        return self.streams[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.streams
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.streams)
+
+    def __len__(self) -> int:
+        return len(self.streams)
+
+    def _each(self, change: Any) -> SensorLog:  # noqa: ANN401
+        return SensorLog({name: change(stream) for name, stream in self.streams.items()}, self.name)
+
+    def sorted(self) -> SensorLog:
+        """Every stream in the order of its stamps (stable)."""
+        return self._each(lambda s: s.select(np.argsort(s.t, kind="stable")))
+
+    def unique(self) -> SensorLog:
+        """Without readings whose stamp and context came before."""
+        return self._each(lambda s: s.select(~s.repeated()))
+
+    def finite(self) -> SensorLog:
+        """Without readings that hold NaN or infinity."""
+        return self._each(lambda s: s.select(np.isfinite(s.values).all(axis=1)))
+
+    def replaced(self, **streams: Stream) -> SensorLog:
+        """The same log with some streams exchanged or added."""
+        return SensorLog({**self.streams, **streams}, self.name)
+
+    def without(self, *names: str) -> SensorLog:
+        """The same log without some streams."""
+        return replace(self, streams={k: s for k, s in self.streams.items() if k not in names})
+
+    def between(self, start: int | None = None, stop: int | None = None) -> SensorLog:
+        """Readings with start <= t <= stop (ns)."""
+        low = np.iinfo(np.int64).min if start is None else start
+        high = np.iinfo(np.int64).max if stop is None else stop
+        return self._each(lambda s: s.select((s.t >= low) & (s.t <= high)))
+
+    def span(self) -> tuple[int, int]:
+        """First and last stamp of all streams, ns."""
+        filled = [s.t for s in self.streams.values() if len(s)]
+        if not filled:
+            msg = f"log {self.name!r} holds no reading at all"
+            raise MissingStreamError(msg)
+        return min(int(t[0]) for t in filled), max(int(t[-1]) for t in filled)
+
+    def hold_out(self, name: str, every: int) -> tuple[SensorLog, Stream]:
+        """Keep one reading in `every` of a stream; return the thinner log and the readings held out.
+
+        The kept readings are number `every`-1, 2·`every`-1 … counted from zero.
+        """
+        stream = self[name]
+        if every < 1:
+            msg = f"one reading in {every} cannot be kept; give 1 or more"
+            raise ShapeError(msg)
+        kept = (np.arange(len(stream)) + 1) % every == 0
+        return self.replaced(**{name: stream.select(kept)}), stream.select(~kept)
+
+
+def check_stream(name: str, stream: Stream) -> None:
+    """Raise if a stream is not finite, runs backwards or says a thing twice."""
+    bad = ~np.isfinite(stream.values).all(axis=1)
+    if bad.any():
+        at = int(np.flatnonzero(bad)[0])
+        msg = (
+            f"log[{name!r}] holds NaN or infinity at sample {at} (and {int(bad.sum()) - 1} more); "
+            "drop such samples with log.finite()"
+        )
+        raise NotFiniteError(msg)
+    back = np.flatnonzero(np.diff(stream.t) < 0)
+    if len(back):
+        k = int(back[0]) + 1
+        before, now = stream.t[k - 1] * 1e-9, stream.t[k] * 1e-9
+        msg = (
+            f"log[{name!r}] goes backwards at sample {k}: {before:.6f} s then {now:.6f} s; "
+            "sort it with log.sorted()"
+        )
+        raise TimeOrderError(msg)
+    if len(stream) and not (np.diff(stream.t) > 0).all() and (repeat := stream.repeated()).any():
+        k = int(np.flatnonzero(repeat)[0])
+        msg = (
+            f"log[{name!r}] repeats the stamp {stream.t[k] * 1e-9:.6f} s at sample {k} "
+            f"({int(repeat.sum())} repeats in all); drop repeats with log.unique()"
+        )
+        raise TimeOrderError(msg)

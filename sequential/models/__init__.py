@@ -1,0 +1,24 @@
+"""Motion and sensor models; each is a small frozen declaration that every estimator takes."""
+
+from sequential.models.declared import LinearSensor, Process, Sensor
+from sequential.models.direction import Direction
+from sequential.models.inertial import Strapdown, inertial_state
+from sequential.models.motion import ConstantVelocity, RandomWalk
+from sequential.models.position import Position
+from sequential.models.ranging import Range, RangeBearing
+from sequential.models.unicycle import Unicycle
+
+__all__ = [
+    "ConstantVelocity",
+    "Direction",
+    "LinearSensor",
+    "Position",
+    "Process",
+    "RandomWalk",
+    "Range",
+    "RangeBearing",
+    "Sensor",
+    "Strapdown",
+    "Unicycle",
+    "inertial_state",
+]

@@ -1,0 +1,6 @@
+"""Smoothers: what the whole log says about each moment of it."""
+
+from sequential.smoothers.iterated import IteratedSmoother
+from sequential.smoothers.rauch_tung_striebel import RauchTungStriebel
+
+__all__ = ["IteratedSmoother", "RauchTungStriebel"]

@@ -1,0 +1,75 @@
+"""Gauss-Newton on the whole chain, by linear filtering and smoothing about the last trajectory."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sequential.compile import compiled
+from sequential.errors import NotConvergedError
+from sequential.filters.solution import require_finite, require_solved
+from sequential.history import Report, Run
+from sequential.manifold import Vector
+from sequential.smoothers.leave_one_out import leave_one_out
+from sequential.smoothers.rauch_tung_striebel import RauchTungStriebel
+from sequential.timeline import Problem
+
+__all__ = ["IteratedSmoother"]
+
+
+@dataclass(frozen=True, slots=True)
+class IteratedSmoother:
+    """Maximum a posteriori trajectory: the iterated Kalman smoother (Bell 1994), from an EKF + RTS start.
+
+    Solves the same least-squares problem as a batch factor graph, at the cost of a few filter passes.
+
+    Parameters
+    ----------
+    max_iterations : Gauss-Newton steps
+    tolerance : stop when no tangent step exceeds this many standard deviations of the state
+    """
+
+    max_iterations: int = 30
+    tolerance: float = 1e-4
+    check: bool = True
+    name = "ieks"
+
+    def solve(self, problem: Problem) -> Run:
+        """Smooth the whole log; raises `NotConvergedError` unless `check` is False."""
+        began = time.perf_counter()
+        start = RauchTungStriebel().solve(problem)
+        run = self.refine(problem, start.mean)
+        seconds = time.perf_counter() - began
+        run = replace(run, report=replace(run.report, seconds=seconds), log_likelihood=start.log_likelihood)
+        return replace(run, innovations=leave_one_out(problem, run))
+
+    def refine(self, problem: Problem, trajectory: np.ndarray) -> Run:
+        """Gauss-Newton from a given trajectory (K, n)."""
+        from sequential.kernels.iterated import Linearised, filter_steps
+        from sequential.kernels.smoothing import smooth_history
+
+        whole = compiled(problem.model)
+        nodes, d = len(problem.t), whole.tables.d
+        out = Linearised(*(np.empty((nodes, d) if flat else (nodes, d, d)) for flat in (1, 0, 1, 0, 0)))
+        flat = Vector(d).table()
+        prior, manifold = problem.model.prior, problem.model.manifold
+        trajectory = np.array(trajectory)
+        delta, cov = np.empty((nodes, d)), np.empty((nodes, d, d))
+        largest, iteration = np.inf, 0
+        while iteration < self.max_iterations and largest > self.tolerance:
+            iteration += 1
+            failed = filter_steps(whole.tables, problem.schedule, prior.mean, prior.cov, trajectory, out)
+            whole.raise_failures()
+            require_solved(problem, failed)
+            smooth_history(flat, *out, 1, delta, cov)
+            largest = float(np.max(np.abs(delta) / np.sqrt(np.diagonal(cov, axis1=1, axis2=2).clip(1e-300))))
+            trajectory = manifold.retract(trajectory, delta)
+            require_finite(problem, trajectory)
+        converged = largest <= self.tolerance
+        message = "" if converged else f"still moving by {largest:.2g} σ after {iteration} iterations"
+        if not converged and self.check:
+            raise NotConvergedError(f"the iterated smoother is {message}; raise max_iterations or mend the start")
+        report = Report(self.name, converged, iteration, message=message or whole.message())
+        return Run(problem.t, trajectory, cov, manifold, {}, float("nan"), report)

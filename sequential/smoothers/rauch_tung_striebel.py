@@ -1,0 +1,53 @@
+"""The fixed-interval smoother of Rauch, Tung and Striebel, behind any filter that keeps its predictions."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from sequential.filters.extended import ExtendedKalmanFilter
+from sequential.history import Report, Run
+from sequential.smoothers.leave_one_out import leave_one_out
+from sequential.timeline import Problem
+
+__all__ = ["RauchTungStriebel"]
+
+
+@dataclass(frozen=True, slots=True)
+class RauchTungStriebel:
+    """Filter forwards, smooth backwards (Rauch, Tung, Striebel 1965; on a manifold as the error state).
+
+    Parameters
+    ----------
+    filter : any recursive filter with a `keep` setting
+    """
+
+    filter: Any = field(default_factory=ExtendedKalmanFilter)
+
+    @property
+    def name(self) -> str:
+        """`ekf_rts`, `ukf_rts` …"""
+        return f"{self.filter.name}_rts"
+
+    def solve(self, problem: Problem) -> Run:
+        """Smooth the whole log."""
+        from sequential.kernels.smoothing import smooth_history
+
+        forward = replace(self.filter, keep=True).solve(problem)
+        before = forward.predicted
+        assert before is not None  # noqa: S101 - keep=True, for the type checker
+        mean, cov = np.empty_like(forward.mean), np.empty_like(forward.cov)
+        began = time.perf_counter()
+        table = problem.model.manifold.table()
+        smooth_history(
+            table, forward.mean, forward.cov, before.mean, before.cov, before.transition, 1, mean, cov
+        )
+        seconds = forward.report.seconds + time.perf_counter() - began
+        report = Report(self.name, seconds=seconds, message=forward.report.message, rejected=forward.report.rejected)
+        smoothed = Run(
+            problem.t, mean, cov, forward.manifold, {}, forward.log_likelihood, report, forward.predicted
+        )
+        return replace(smoothed, innovations=leave_one_out(problem, smoothed, forward))
