@@ -67,7 +67,11 @@ def _lower(model: StateSpace) -> Compiled:
     n, d, f = model.manifold.size, model.manifold.dim, model.process_functions
     process = [
         _address(whole, f, raw, f"process {role}", (n, f.inputs, size))
-        for raw, role, size in ((f.value, "step", n), (f.jacobian, "jacobian", d * d), (f.noise, "noise", d * d))
+        for raw, role, size in (
+            (f.value, "step", n),
+            (f.jacobian, "jacobian", d * d),
+            (f.noise, "noise", d * d),
+        )
     ]
     fused = [_address(whole, f, raw, "", (n, f.inputs, 0)) for raw in (f.advance, f.carry)]
     sensors = list(model.sensors.values())
@@ -83,7 +87,7 @@ def _lower(model: StateSpace) -> Compiled:
         noise_cov[k, : sensor.manifold.dim, : sensor.manifold.dim] = sensor.noise_cov
     z_tables = [s.manifold.table() for s in sensors] or [np.zeros((0, 5), dtype=np.int64)]
     params = [g.params for g in lowered] or [np.zeros(1)]
-    whole.tables = ModelTables(*(sealed(v) if isinstance(v, np.ndarray) else v for v in (
+    entries: tuple[Any, ...] = (
         model.manifold.table(), n, d, *process, *fused, f.params,
         _ints(observe), _ints(look), np.concatenate(params), _starts(params),
         np.ascontiguousarray(np.concatenate(z_tables)), np.append(_starts(z_tables), sum(map(len, z_tables))),
@@ -91,7 +95,8 @@ def _lower(model: StateSpace) -> Compiled:
         np.array([_threshold(s.gate, s.manifold.dim) for s in sensors]),
         _ints([s.loss.code if s.loss else 0 for s in sensors]),
         np.array([s.loss.k if s.loss else 0.0 for s in sensors]),
-    )))  # fmt: skip
+    )  # fmt: skip
+    whole.tables = ModelTables._make(sealed(v) if isinstance(v, np.ndarray) else v for v in entries)
     return whole
 
 
@@ -114,9 +119,7 @@ def _threshold(gate: float | None, dim: int) -> float:
     return float(chdtri(dim, 1.0 - gate))
 
 
-def _address(
-    whole: Compiled, functions: Functions, raw: Any, name: str, sizes: tuple[int, int, int]  # noqa: ANN401
-) -> int:
+def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: tuple[int, int, int]) -> int:
     if raw is None:
         return 0
     if not isinstance(raw, Plain):
@@ -133,7 +136,7 @@ def _address(
 
 
 @cache
-def _built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) -> Any:  # noqa: ANN401
+def _built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) -> Any:
     from numba import cfunc
     from numba.extending import register_jitable
 
@@ -144,7 +147,7 @@ def _built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...])
     return cfunc(MODEL_SIGNATURE, cache=True, error_model="numpy")(raw)
 
 
-def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:  # noqa: ANN401
+def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:
     """A user's function as a C function: arguments become arrays (copies, so that it may write to them)."""
     from numba import carray, cfunc, njit
 
@@ -156,7 +159,11 @@ def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:  # noqa: ANN401
     given = ", ".join(arguments[name] for name in raw.arguments)
     kind = type(evaluate_kind(raw, n, inputs))
     take = "value" if kind in {float, int, np.float64} else "flat[i]"
-    flat = "" if take == "value" else f"    flat = {'value' if kind is np.ndarray else 'np.array(value)'}.ravel()\n"
+    flat = (
+        ""
+        if take == "value"
+        else f"    flat = {'value' if kind is np.ndarray else 'np.array(value)'}.ravel()\n"
+    )
     source = (
         f"def wrapper(x, u, dt, p, out):\n    value = inner({given})\n{flat}"
         f"    for i in range({size}):\n        out[i] {'+=' if adds else '='} {take}\n"
@@ -166,16 +173,16 @@ def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:  # noqa: ANN401
     return cfunc(MODEL_SIGNATURE, error_model="numpy")(scope["wrapper"])
 
 
-def evaluate_kind(raw: Plain, n: int, inputs: int) -> Any:  # noqa: ANN401
+def evaluate_kind(raw: Plain, n: int, inputs: int) -> Any:
     """One value of a user's function, to see whether it returns an array, a list or a number."""
     known = {"x": np.full(n, 0.5), "u": np.zeros(max(inputs, 1)), "dt": 0.01}
     return raw.function(*(known[name] for name in raw.arguments))
 
 
-def _interpret(whole: Compiled, raw: Plain, sizes: tuple[int, int, int]) -> Any:  # noqa: ANN401
+def _interpret(whole: Compiled, raw: Plain, sizes: tuple[int, int, int]) -> Any:
     n, inputs, size = sizes
 
-    def callback(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ANN401, ARG001
+    def callback(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
         view = np.ctypeslib.as_array(out, (size,))
         try:
             state = np.ctypeslib.as_array(x, (n,)).copy()
@@ -205,7 +212,7 @@ def warm_up(progress: Callable[[str], None] = lambda _: None) -> None:
                 _built_in(function, getattr(module, "HELPERS", ()))
 
 
-def _is_raw(function: Any) -> bool:  # noqa: ANN401
+def _is_raw(function: Any) -> bool:
     code = getattr(function, "__code__", None)
     return code is not None and code.co_varnames[: code.co_argcount] == ("x", "u", "dt", "p", "out")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError
 from sequential.log import nanoseconds
-from sequential.manifold import Manifold
+from sequential.manifold import Manifold, Product
 
 __all__ = ["Innovations", "Prediction", "Report", "Run"]
 
@@ -36,7 +36,8 @@ class Innovations:
     def nis(self) -> Array:
         """(M,) normalised innovation squared, rᵀ S⁻¹ r, of every reading, gated or not."""
         solved = np.linalg.solve(self.cov, self.residual[..., None])[..., 0]
-        return np.einsum("ni,ni->n", self.residual, solved)
+        squared: Array = np.einsum("ni,ni->n", self.residual, solved)
+        return squared
 
     def whitened(self) -> Array:
         """(M, m) residuals multiplied by the inverse Cholesky factor of their covariance."""
@@ -105,7 +106,9 @@ class Run:
 
     def part(self, name: str) -> Array:
         """(N, size) one named part of a product state."""
-        return self.mean[:, self.manifold.storage(name)]  # type: ignore[attr-defined]
+        if not isinstance(self.manifold, Product):
+            raise DataError(f"the state is {self.manifold}, which has no named parts such as {name!r}")
+        return self.mean[:, self.manifold.storage(name)]
 
     def sigmas(self) -> Array:
         """(N, d) standard deviations along the tangent directions."""

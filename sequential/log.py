@@ -127,7 +127,8 @@ class SensorLog(Mapping[str, Stream]):
 
     def __getitem__(self, name: str) -> Stream:
         if name not in self.streams:
-            msg = f"log {self.name!r} has no stream {name!r}; it has {', '.join(sorted(self.streams)) or 'none'}"
+            known = ", ".join(sorted(self.streams)) or "none"
+            msg = f"log {self.name!r} has no stream {name!r}; it has {known}"
             raise MissingStreamError(msg)
         return self.streams[name]
 
@@ -140,7 +141,7 @@ class SensorLog(Mapping[str, Stream]):
     def __len__(self) -> int:
         return len(self.streams)
 
-    def _each(self, change: Any) -> SensorLog:  # noqa: ANN401
+    def _each(self, change: Any) -> SensorLog:
         return SensorLog({name: change(stream) for name, stream in self.streams.items()}, self.name)
 
     def sorted(self) -> SensorLog:

@@ -6,7 +6,7 @@ import abc
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,14 +21,12 @@ __all__ = ["Functions", "Gaussian", "Loss", "Plain", "ProcessModel", "SensorMode
 Array = NDArray[np.float64]
 
 
-class Raw(Protocol):
-    """What kernels call: everything in place, no allocation.
+Raw = Callable[[Any, Any, float, Any, Any], None]
+"""What kernels call, f(x, u, dt, params, out): everything in place, no allocation.
 
-    `x` state storage, `u` input or context, `dt` seconds, `params` the model's numbers, `out` the result.
-    Jacobians are written row by row; a noise function *adds* its (d, d) covariance to `out`.
-    """
-
-    def __call__(self, x: Any, u: Any, dt: float, params: Any, out: Any) -> None: ...
+`x` state storage, `u` input or context, `dt` seconds, `params` the model's numbers, `out` the result.
+Jacobians are written row by row; a noise function *adds* its (d, d) covariance to `out`.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +39,7 @@ class Plain:
     adds: bool = False
 
     def __call__(self, x: Any, u: Any, dt: float, params: Any, out: Any) -> None:
+        """Call the function and write, or add, what it returns to `out`."""
         known = {"x": x, "u": u, "dt": dt}
         value = np.asarray(self.function(*(known[name] for name in self.arguments)), dtype=np.float64).ravel()
         if value.size != self.size:
@@ -75,7 +74,7 @@ class Functions:
     `value` is the step or the observation, `params` the numbers it is given, `inputs` the length of `u`,
     `helpers` the plain functions that it calls (compiled together with it).  Two optional functions let a
     process use the zeros of its Jacobian F: `advance` pushes mean and covariance at once (`out` is
-    [mean (n) | covariance (d·d)], in place), `carry` multiplies the (d, d) matrix at `out` by F from the left.
+    [mean (n) | covariance (d·d)], in place), `carry` multiplies the (d, d) matrix at `out` by F on the left.
     """
 
     value: Raw

@@ -33,7 +33,8 @@ class ImuNoise:
     accel_density : velocity random walk, m/s²/√Hz
     gyro_bias_walk : rate random walk, rad/s²/√Hz
     accel_bias_walk : m/s³/√Hz
-    integration_density : position error of the integration scheme itself, m/√s (GTSAM's integration covariance)
+    integration_density : position error of the integration scheme itself, m/√s (GTSAM's integration
+        covariance)
 
     Notes
     -----

@@ -148,11 +148,10 @@ def _steps(
     _require_no_gap(model.input, stream, nodes, max_gap)
     inside = stream.t[(stream.t > nodes[0]) & (stream.t < nodes[-1])]
     edges = np.union1d(inside, nodes)
-    side = "right" if stream.covers == "after" else "left"
     if stream.covers == "after":
         rows = np.searchsorted(stream.t, edges[:-1], side="right") - 1
     else:
-        rows = np.searchsorted(stream.t, edges[1:], side=side)
+        rows = np.searchsorted(stream.t, edges[1:], side="left")
     rows = np.clip(rows, 0, len(stream) - 1).astype(np.int64)
     pointer = np.searchsorted(edges, nodes).astype(np.int64)
     pointer = np.concatenate([[0], pointer])

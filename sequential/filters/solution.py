@@ -14,7 +14,7 @@ from sequential.timeline import Problem
 __all__ = ["allocate", "as_run", "collect_innovations", "require_finite", "require_solved"]
 
 
-def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:  # noqa: ANN401
+def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:
     """Empty arrays in the order of the kernels' `Filtered` record."""
     nodes, readings = len(problem.t), len(problem.reading_t)
     n, d, widest = tables.n, tables.d, problem.schedule.z.shape[1]
@@ -56,7 +56,7 @@ def require_finite(problem: Problem, mean: np.ndarray) -> None:
         raise NotPositiveDefiniteError(msg)
 
 
-def collect_innovations(problem: Problem, filtered: Any) -> Mapping[str, Innovations]:  # noqa: ANN401
+def collect_innovations(problem: Problem, filtered: Any) -> Mapping[str, Innovations]:
     """Innovations of each sensor, by its name."""
     found = {}
     for index, (name, sensor) in enumerate(problem.model.sensors.items()):
@@ -72,7 +72,7 @@ def collect_innovations(problem: Problem, filtered: Any) -> Mapping[str, Innovat
     return found
 
 
-def as_run(problem: Problem, filtered: Any, log_likelihood: float, report: Report, *, keep: bool) -> Run:  # noqa: ANN401
+def as_run(problem: Problem, filtered: Any, log_likelihood: float, report: Report, *, keep: bool) -> Run:
     """The `Run` of a recursive filter."""
     predicted = None
     if keep:

@@ -16,7 +16,13 @@ import numba
 
 __all__ = ["cache_folder"]
 
-INLINED = ("kernels/call.py", "kernels/matrices.py", "kernels/charts.py", "kernels/poses.py", "kernels/sensing.py")
+INLINED = (
+    "kernels/call.py",
+    "kernels/matrices.py",
+    "kernels/charts.py",
+    "kernels/poses.py",
+    "kernels/sensing.py",
+)
 
 
 def cache_folder() -> Path:

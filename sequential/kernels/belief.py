@@ -23,7 +23,7 @@ LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
 @njit(cache=True, error_model="numpy")
-def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):  # type: ignore[no-untyped-def]
+def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):
     """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹; returns (NIS, log det S), NIS negative if S is not positive definite.
 
     `cross` holds H P (m, d) and `gain` Kᵀ (m, d); `lower` the Cholesky factor of S.
@@ -54,7 +54,7 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
 
 
 @njit(cache=True, error_model="numpy")
-def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):  # type: ignore[no-untyped-def]
+def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):
     """P <- (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; symmetric for any gain."""
     for i in range(d):
         for j in range(d):

@@ -19,14 +19,12 @@ MODEL_SIGNATURE = types.void(POINTER, POINTER, types.float64, POINTER, POINTER)
 
 
 @intrinsic
-def call(  # type: ignore[no-untyped-def]  # noqa: PLR0913
-    typingctx, address, x, x_at, u, u_at, dt, params, params_at, out, out_at  # noqa: ANN001, ARG001
-) -> Any:  # noqa: ANN401
+def call(typingctx, address, x, x_at, u, u_at, dt, params, params_at, out, out_at) -> Any:
     """Call the function at `address` on (x, u, dt, params, out), each array from a flat element offset."""
     signature = types.void(address, x, x_at, u, u_at, dt, params, params_at, out, out_at)
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ANN401
-        def pointer(array: int, offset: int) -> Any:  # noqa: ANN401
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        def pointer(array: int, offset: int) -> Any:
             data = context.make_array(sig.args[array])(context, builder, args[array]).data
             return builder.gep(data, [args[offset]])
 

@@ -32,13 +32,13 @@ VECTOR, SO2, SO3, SE2, SE3, NAV = range(6)
 
 
 @njit(cache=True, error_model="numpy")
-def wrap(angle):  # type: ignore[no-untyped-def]
+def wrap(angle):
     """Angle in ]-π, π]."""
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
 @njit(cache=True, error_model="numpy")
-def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):  # type: ignore[no-untyped-def]
+def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):
     """out = x ⊕ xi over the blocks first:last, arrays flat from their offsets; out may be x."""
     for b in range(first, last):
         kind = table[b, 0]
@@ -77,7 +77,7 @@ def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):  # type: ignor
 
 
 @njit(cache=True, error_model="numpy")
-def local(table, first, last, x, x_at, y, y_at, out, out_at):  # type: ignore[no-untyped-def]
+def local(table, first, last, x, x_at, y, y_at, out, out_at):
     """out = the tangent vector at x that leads to y."""
     for b in range(first, last):
         kind = table[b, 0]
@@ -100,7 +100,11 @@ def local(table, first, last, x, x_at, y, y_at, out, out_at):  # type: ignore[no
                 continue
             r = rotation(x[s], x[s + 1], x[s + 2], x[s + 3])
             for at in range(4, table[b, 3], 3):
-                a, bb, cc = y[k + at] - x[s + at], y[k + at + 1] - x[s + at + 1], y[k + at + 2] - x[s + at + 2]
+                a, bb, cc = (
+                    y[k + at] - x[s + at],
+                    y[k + at + 1] - x[s + at + 1],
+                    y[k + at + 2] - x[s + at + 2],
+                )
                 for i in range(3):
                     out[o + at - 1 + i] = r[i] * a + r[3 + i] * bb + r[6 + i] * cc
             if kind == SE3:
@@ -109,8 +113,8 @@ def local(table, first, last, x, x_at, y, y_at, out, out_at):  # type: ignore[no
 
 
 @njit(cache=True, error_model="numpy")
-def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):  # type: ignore[no-untyped-def]
-    """For e = local(x, y): `inverse` = (∂e/∂y)⁻¹ and `turn` = -(∂e/∂y)⁻¹ ∂e/∂x, both (d, d); e (d,) is written."""
+def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):
+    """Linearise e = local(x, y): `inverse` = (∂e/∂y)⁻¹ and `turn` = -(∂e/∂y)⁻¹ ∂e/∂x, both (d, d)."""
     local(table, 0, blocks, x, x_at, y, y_at, e, 0)
     for i in range(d):
         for j in range(d):
@@ -118,7 +122,7 @@ def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):  # type: ig
             inverse[i, j] = 0.0
     for b in range(blocks):
         kind, t = table[b, 0], table[b, 2]
-        if kind == VECTOR or kind == SO2:  # noqa: PLR1714 - a set would be built at run time
+        if kind == VECTOR or kind == SO2:  # noqa: PLR1714, SIM109 - a set would be built at run time
             for i in range(table[b, 4]):
                 turn[t + i, t + i] = 1.0
                 inverse[t + i, t + i] = 1.0
@@ -140,7 +144,7 @@ def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):  # type: ig
 
 
 @njit(cache=True, error_model="numpy")
-def nav_transport(a, e, t, turn, inverse):  # type: ignore[no-untyped-def]
+def nav_transport(a, e, t, turn, inverse):
     """Position and velocity blocks: Aᵀ, and -Aᵀ [e]x from the rotation, with Aᵀ given row by row."""
     for at in (3, 6):
         p, q, r = e[t + at], e[t + at + 1], e[t + at + 2]

@@ -14,7 +14,7 @@ from numba import njit, types
 
 from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
 from sequential.kernels.call import call
-from sequential.kernels.charts import local, retract, transport
+from sequential.kernels.charts import retract, transport
 from sequential.kernels.matrices import multiply, push_covariance
 from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
 from sequential.kernels.sensing import loss_weight, measure, process_jacobian, sensor_jacobian
@@ -43,7 +43,7 @@ FINISHED = types.Tuple([types.float64, types.int64])
 
 
 @njit(cache=True, error_model="numpy")
-def predict(model, plan, node, belief, x, p, phi, keep, work):  # type: ignore[no-untyped-def]
+def predict(model, plan, node, belief, x, p, phi, keep, work):
     """Carry belief = [x | p] (and phi with `keep`) along the steps that lead to a node."""
     d, width = model.d, plan.inputs.shape[1]
     f, flat, after, flipped = work
@@ -65,7 +65,7 @@ def predict(model, plan, node, belief, x, p, phi, keep, work):  # type: ignore[n
 
 
 @njit(cache=True, error_model="numpy")
-def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):  # type: ignore[no-untyped-def]
+def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):
     """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if S is indefinite."""
     s = plan.sensor[reading]
     m, d, blocks = model.z_dim[s], model.d, len(model.table)
@@ -131,10 +131,8 @@ def absorb(model, plan, reading, x, p, iterations, update, work, expected, resid
     return log_likelihood
 
 
-@njit(
-    FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, FILTERED), cache=True, error_model="numpy"
-)
-def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):  # type: ignore[no-untyped-def]
+@njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, FILTERED), cache=True, error_model="numpy")
+def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
     """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite)."""
     n, d = model.n, model.d
     nodes, widest = len(plan.reading_ptr) - 1, plan.z.shape[1]
@@ -146,7 +144,8 @@ def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):  # ty
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
     update = (
         np.empty((widest, d)), np.empty(widest * d), np.empty((widest, d)), np.empty((widest, d)),
-        np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))), np.empty(d), np.empty(d),
+        np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
+        np.empty(d), np.empty(d),
     )  # fmt: skip
     expected, residual = np.empty(widest), np.empty(widest)
     log_likelihood = 0.0

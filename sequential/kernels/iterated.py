@@ -13,7 +13,6 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.belief import gain_and_innovation, joseph
-from sequential.kernels.call import call
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
 from sequential.kernels.matrices import multiply, multiply_nt, push_covariance
@@ -38,8 +37,8 @@ LINEARISED = types.NamedTuple([_f2, _f3, _f2, _f3, _f3], Linearised)
 
 
 @njit(cache=True, error_model="numpy")
-def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, expected, residual):  # type: ignore[no-untyped-def]
-    """Update the belief about δ by one reading linearised at the trajectory; robust weights from its residual."""
+def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, expected, residual):
+    """Update the belief about δ by one reading linearised at the trajectory, with the robust weight there."""
     s = plan.sensor[reading]
     m, d = model.z_dim[s], model.d
     h, flat, cross, gain, innovation_cov, lower, scaled = update
@@ -63,7 +62,7 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
 
 
 @njit(cache=True, error_model="numpy")
-def whitened_square(noise, residual, m, lower):  # type: ignore[no-untyped-def]
+def whitened_square(noise, residual, m, lower):
     """Residualᵀ R⁻¹ residual by forward substitution."""
     total = 0.0
     white = np.empty(m)
@@ -72,7 +71,7 @@ def whitened_square(noise, residual, m, lower):  # type: ignore[no-untyped-def]
             s = noise[i, j]
             for k in range(j):
                 s -= lower[i, k] * lower[j, k]
-            lower[i, j] = s ** 0.5 if i == j else s / lower[j, j]
+            lower[i, j] = s**0.5 if i == j else s / lower[j, j]
     for i in range(m):
         s = residual[i]
         for k in range(i):
@@ -83,7 +82,7 @@ def whitened_square(noise, residual, m, lower):  # type: ignore[no-untyped-def]
 
 
 @njit(types.int64(MODEL, SCHEDULE, f1, f2, f2, LINEARISED), cache=True, error_model="numpy")
-def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):  # type: ignore[no-untyped-def]
+def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):
     """Linearise about the trajectory (K, n) and filter; returns -1, or the reading where S was indefinite."""
     n, d, blocks = model.n, model.d, len(model.table)
     nodes, widest = len(plan.reading_ptr) - 1, plan.z.shape[1]
@@ -131,7 +130,9 @@ def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):  # type: 
         out.predicted_cov[node] = cov
         out.transition[node] = phi
         for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
-            absorbed = absorb_step(model, plan, reading, states, node * n, mean, cov, update, work, expected, residual)
+            absorbed = absorb_step(
+                model, plan, reading, states, node * n, mean, cov, update, work, expected, residual
+            )
             if absorbed < 0:
                 return reading
         out.mean[node] = mean

@@ -21,7 +21,7 @@ TINY = 1e-13  # a pivot below this share of its diagonal has been lost to roundi
 
 
 @njit(cache=True, error_model="numpy")
-def multiply(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
+def multiply(a, b, out, n, m, p):
     """out (n, p) = a (n, m) b (m, p); zeros of a are skipped, which pays for a sparse Jacobian."""
     for i in range(n):
         for j in range(p):
@@ -34,7 +34,7 @@ def multiply(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def multiply_nt(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
+def multiply_nt(a, b, out, n, m, p):
     """out (n, p) = a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
         for j in range(p):
@@ -45,7 +45,7 @@ def multiply_nt(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def add_product_nt(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
+def add_product_nt(a, b, out, n, m, p):
     """out (n, p) += a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
         for j in range(p):
@@ -56,7 +56,7 @@ def add_product_nt(a, b, out, n, m, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def symmetrise(a, n):  # type: ignore[no-untyped-def]
+def symmetrise(a, n):
     """a <- (a + aᵀ) / 2."""
     for i in range(n):
         for j in range(i):
@@ -66,7 +66,7 @@ def symmetrise(a, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def push_covariance(f, p, work, flipped, d):  # type: ignore[no-untyped-def]
+def push_covariance(f, p, work, flipped, d):
     """p <- F p Fᵀ for symmetric p, as F (F p)ᵀ: both products skip the zeros of F."""
     multiply(f, p, work, d, d, d)
     for i in range(d):
@@ -77,7 +77,7 @@ def push_covariance(f, p, work, flipped, d):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def cholesky(a, lower, n, lenient):  # type: ignore[no-untyped-def]
+def cholesky(a, lower, n, lenient):
     """Lower factor of a; returns the number of pivots lost to rounding.
 
     A lost pivot is an error to most callers.  With `lenient`, its column becomes zero, which makes the
@@ -109,7 +109,7 @@ def cholesky(a, lower, n, lenient):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def solve_lower(lower, b, n, p):  # type: ignore[no-untyped-def]
+def solve_lower(lower, b, n, p):
     """b (n, p) <- L⁻¹ b; rows of lost pivots become zero."""
     for i in range(n):
         pivot = lower[i, i]
@@ -122,7 +122,7 @@ def solve_lower(lower, b, n, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def solve_lower_transposed(lower, b, n, p):  # type: ignore[no-untyped-def]
+def solve_lower_transposed(lower, b, n, p):
     """b (n, p) <- L⁻ᵀ b; rows of lost pivots become zero."""
     for i in range(n - 1, -1, -1):
         pivot = lower[i, i]

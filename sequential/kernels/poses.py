@@ -28,7 +28,7 @@ SERIES = 30  # terms: π³⁰/30! is 1e-18
 
 
 @njit(cache=True, error_model="numpy")
-def se2_exp(x, y, angle):  # type: ignore[no-untyped-def]
+def se2_exp(x, y, angle):
     """Translation of Exp(x, y, angle) (Solà et al. 2018, eq. 156-158)."""
     if abs(angle) < SMALL:
         a = 1.0 - angle * angle / 6.0
@@ -40,7 +40,7 @@ def se2_exp(x, y, angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def se2_log(x, y, angle):  # type: ignore[no-untyped-def]
+def se2_log(x, y, angle):
     """Translational tangent of the pose (x, y, angle)."""
     half = 0.5 * angle
     a = 1.0 - angle * angle / 12.0 if abs(angle) < SMALL else half / math.tan(half)
@@ -48,7 +48,7 @@ def se2_log(x, y, angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def se2_adjoint_inverse(x, y, angle, out, at):  # type: ignore[no-untyped-def]
+def se2_adjoint_inverse(x, y, angle, out, at):
     """Ad(Exp(x, y, angle)⁻¹) into out[at:at+3, at:at+3]."""
     dx, dy = se2_exp(-x, -y, -angle)
     c, s = math.cos(angle), math.sin(angle)
@@ -58,7 +58,7 @@ def se2_adjoint_inverse(x, y, angle, out, at):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def se2_right_jacobian(x, y, angle, out, at):  # type: ignore[no-untyped-def]
+def se2_right_jacobian(x, y, angle, out, at):
     """Right Jacobian of SE(2) into out[at:at+3, at:at+3] (Solà et al. 2018, eq. 163)."""
     if abs(angle) < SMALL:
         a = 1.0 - angle * angle / 6.0
@@ -76,7 +76,7 @@ def se2_right_jacobian(x, y, angle, out, at):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def so3_local(w, x, y, z, a, b, c, d):  # type: ignore[no-untyped-def]
+def so3_local(w, x, y, z, a, b, c, d):
     """Rotation vector of conj(w, x, y, z) ⊗ (a, b, c, d), at most π long."""
     p = w * a + x * b + y * c + z * d
     q = w * b - x * a - y * d + z * c
@@ -85,12 +85,16 @@ def so3_local(w, x, y, z, a, b, c, d):  # type: ignore[no-untyped-def]
     if p < 0.0:
         p, q, r, s = -p, -q, -r, -s
     length = math.sqrt(q * q + r * r + s * s)
-    scale = 2.0 / p * (1.0 - length * length / (3.0 * p * p)) if length < SMALL else 2.0 * math.atan2(length, p) / length
+    scale = (
+        2.0 / p * (1.0 - length * length / (3.0 * p * p))
+        if length < SMALL
+        else 2.0 * math.atan2(length, p) / length
+    )
     return scale * q, scale * r, scale * s
 
 
 @njit(cache=True, error_model="numpy")
-def se3_exp(a, b, c, x, y, z):  # type: ignore[no-untyped-def]
+def se3_exp(a, b, c, x, y, z):
     """Translation V(ω) v of Exp(ω, v): V is the left Jacobian of SO(3)."""
     j = right_jacobian(-a, -b, -c)
     return (
@@ -101,7 +105,7 @@ def se3_exp(a, b, c, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def se3_local(a, b, c, x, y, z):  # type: ignore[no-untyped-def]
+def se3_local(a, b, c, x, y, z):
     """V(ω)⁻¹ p = p - ω × p / 2 + k ω × (ω × p)."""
     square = a * a + b * b + c * c
     if square < SMALL * SMALL:
@@ -118,8 +122,8 @@ def se3_local(a, b, c, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def se3_transport(e, t, turn, inverse):  # type: ignore[no-untyped-def]
-    """Ad(Exp(e)⁻¹) and Jr(e) of SE(3) into the blocks at t, by the series of -ad(e) (Barfoot 2017, eq. 7.36, 7.86)."""
+def se3_transport(e, t, turn, inverse):
+    """Ad(Exp(e)⁻¹) and Jr(e) of SE(3) into the blocks at t: series of -ad(e) (Barfoot 2017, 7.36, 7.86)."""
     ad = np.zeros((6, 6))
     for at, k in ((0, 0), (3, 3)):
         skew_into(ad, at, k, e[t], e[t + 1], e[t + 2])
@@ -140,7 +144,7 @@ def se3_transport(e, t, turn, inverse):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def skew_into(out, row, column, x, y, z):  # type: ignore[no-untyped-def]
+def skew_into(out, row, column, x, y, z):
     """Cross-product matrix of (x, y, z) into a 3 x 3 block."""
     out[row, column + 1], out[row, column + 2] = -z, y
     out[row + 1, column], out[row + 1, column + 2] = z, -x
@@ -148,7 +152,7 @@ def skew_into(out, row, column, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def times(power, ad):  # type: ignore[no-untyped-def]
+def times(power, ad):
     """-power ad, 6 x 6, without a BLAS (which takes tens of seconds to compile against)."""
     out = np.zeros((6, 6))
     for i in range(6):

@@ -17,7 +17,7 @@ CAUCHY = 2
 
 
 @njit(cache=True, error_model="numpy")
-def process_jacobian(model, x, u, row, dt, after, out):  # type: ignore[no-untyped-def]
+def process_jacobian(model, x, u, row, dt, after, out):
     """F (d, d) of the step from x, declared or differenced; `after` is the state after the step."""
     width = u.shape[1]
     if model.jacobian != 0:
@@ -41,7 +41,7 @@ def process_jacobian(model, x, u, row, dt, after, out):  # type: ignore[no-untyp
 
 
 @njit(cache=True, error_model="numpy")
-def measure(model, plan, reading, x, x_at, expected, residual):  # type: ignore[no-untyped-def]
+def measure(model, plan, reading, x, x_at, expected, residual):
     """Expected measurement at x, and residual = local(expected, z)."""
     s = plan.sensor[reading]
     width, size = plan.context.shape[1], plan.z.shape[1]
@@ -54,7 +54,7 @@ def measure(model, plan, reading, x, x_at, expected, residual):  # type: ignore[
 
 
 @njit(cache=True, error_model="numpy")
-def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):  # type: ignore[no-untyped-def]
+def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
     """H (m, d) at x, declared or differenced, into the first rows of out; `flat` holds m·d numbers."""
     s = plan.sensor[reading]
     m, d, width = model.z_dim[s], model.d, plan.context.shape[1]
@@ -86,7 +86,7 @@ def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):  # type
 
 
 @njit(cache=True, error_model="numpy")
-def loss_weight(kind, k, squared):  # type: ignore[no-untyped-def]
+def loss_weight(kind, k, squared):
     """Weight of a residual whose whitened squared norm is given; 1 without a loss."""
     if kind == 0:
         return 1.0

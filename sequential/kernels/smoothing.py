@@ -21,10 +21,8 @@ __all__ = ["smooth_history"]
 _f2, _f3 = types.float64[:, ::1], types.float64[:, :, ::1]
 
 
-@njit(
-    types.int64(i2, f2, f3, f2, f3, f3, types.int64, _f2, _f3), cache=True, error_model="numpy"
-)
-def smooth_history(table, mean, cov, predicted_mean, predicted_cov, transition, with_cov, out_mean, out_cov):  # type: ignore[no-untyped-def]
+@njit(types.int64(i2, f2, f3, f2, f3, f3, types.int64, _f2, _f3), cache=True, error_model="numpy")
+def smooth_history(table, mean, cov, predicted_mean, predicted_cov, transition, with_cov, out_mean, out_cov):
     """Smooth a filtered history (Särkkä and Svensson 2023, alg. 13.3); returns the number of lost pivots.
 
     The gain G = P Φᵀ P⁻¹ uses a Cholesky factor of the predicted covariance; where that is singular in a

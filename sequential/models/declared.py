@@ -102,10 +102,9 @@ class Sensor(SensorModel):
 
     def functions(self, manifold: Manifold) -> Functions:
         """Lowered: see `SensorModel.functions`."""
-        full = ("x", "u")
-        d = manifold.dim
-        jacobian = None if self.jacobian is None else plain(self.jacobian, full, self.manifold.dim * d)
-        return Functions(plain(self.observe, full, self.manifold.size), jacobian, as_params(0.0), self.context)
+        full, image = ("x", "u"), vector_or(self.manifold, 1)
+        jacobian = None if self.jacobian is None else plain(self.jacobian, full, image.dim * manifold.dim)
+        return Functions(plain(self.observe, full, image.size), jacobian, as_params(0.0), self.context)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,14 +133,14 @@ class LinearSensor(SensorModel):
         return Functions(linear_observe, linear_jacobian, as_params(*matrix.shape, matrix))
 
 
-def density_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def density_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Add density·dt; p = [d, density (d·d)]."""
     d = int(p[0])
     for i in range(d * d):
         out[i] += p[1 + i] * dt
 
 
-def linear_observe(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def linear_observe(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Matrix times state; p = [m, n, matrix (m·n)]."""
     m, n = int(p[0]), int(p[1])
     for i in range(m):
@@ -151,9 +150,7 @@ def linear_observe(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa
         out[i] = total
 
 
-def linear_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def linear_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """The matrix itself."""
     for i in range(int(p[0]) * int(p[1])):
         out[i] = p[2 + i]
-
-

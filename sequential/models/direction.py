@@ -38,7 +38,7 @@ class Direction(SensorModel):
     def __post_init__(self) -> None:
         vector = np.asarray(self.world_v, dtype=np.float64)
         if vector.shape != (3,) or not np.linalg.norm(vector) > 0:
-            msg = f"Direction needs a world_v of three numbers that are not all zero, got {self.world_v}"
+            msg = f"Direction needs a world_v of three numbers that are not all zero, got {self.world_v!r}"
             raise ModelError(msg)
         object.__setattr__(self, "world_v", vector)
         object.__setattr__(self, "manifold", Vector(3))
@@ -52,7 +52,7 @@ class Direction(SensorModel):
         return Functions(look, look_jacobian, params, helpers=HELPERS)
 
 
-def look(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def look(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """p = [storage, tangent, d, world_v (3)]."""
     at = int(p[0])
     r = rotation(x[at], x[at + 1], x[at + 2], x[at + 3])
@@ -60,7 +60,7 @@ def look(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
         out[i] = r[i] * p[3] + r[3 + i] * p[4] + r[6 + i] * p[5]
 
 
-def look_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def look_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """[Rᵀ v]x on the rotation."""
     at, t, d = int(p[0]), int(p[1]), int(p[2])
     r = rotation(x[at], x[at + 1], x[at + 2], x[at + 3])

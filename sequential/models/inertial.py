@@ -46,13 +46,12 @@ class Strapdown(ProcessModel):
             msg = f"Strapdown needs a state that begins as inertial_state() does; the state is {manifold}"
             raise ModelError(msg)
         n = self.noise
-        variances = [
-            s * s
-            for s in (n.accel_density, n.gyro_density, n.accel_bias_walk, n.gyro_bias_walk, n.integration_density)
-        ]
+        sigmas = (n.accel_density, n.gyro_density, n.accel_bias_walk, n.gyro_bias_walk, n.integration_density)
+        variances = [s * s for s in sigmas]
         params = as_params(manifold.size, manifold.dim, self.gravity, variances)
-        fused = (advance, carry) if manifold.dim == 15 else (None, None)
-        return Functions(step, jacobian, params, 6, noise, *fused, HELPERS)
+        if manifold.dim == 15:
+            return Functions(step, jacobian, params, 6, noise, advance, carry, HELPERS)
+        return Functions(step, jacobian, params, 6, noise, helpers=HELPERS)
 
 
 def step(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
@@ -163,7 +162,7 @@ def transpose(out: Any, at: int) -> None:
             out[k], out[m] = out[m], out[k]
 
 
-def carry(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def carry(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Φ <- F Φ for the transition at `out` (15 x 15)."""
     wx, wy, wz = (u[3] - x[13]) * dt, (u[4] - x[14]) * dt, (u[5] - x[15]) * dt
     push(wx, wy, wz, u[0] - x[10], u[1] - x[11], u[2] - x[12], dt, out, 0)

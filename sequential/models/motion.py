@@ -38,14 +38,14 @@ class RandomWalk(ProcessModel):
         return Functions(stay, stay_jacobian, as_params(d, cov, n), noise=density_noise)
 
 
-def stay(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def stay(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """The state as it was; p = [d, density (d·d), n]."""
     d = int(p[0])
     for i in range(int(p[1 + d * d])):
         out[i] = x[i]
 
 
-def stay_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def stay_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Identity."""
     d = int(p[0])
     for i in range(d * d):
@@ -65,7 +65,8 @@ class ConstantVelocity(ProcessModel):
 
     Notes
     -----
-    Exact discretisation: Q = q [[dt³/3, dt²/2], [dt²/2, dt]] per axis (Bar-Shalom, Li, Kirubarajan 2001, eq. 6.2.2-12).
+    Exact discretisation: Q = q [[dt³/3, dt²/2], [dt²/2, dt]] per axis (Bar-Shalom, Li, Kirubarajan 2001,
+    eq. 6.2.2-12).
     """
 
     acceleration_density: float
@@ -84,7 +85,7 @@ class ConstantVelocity(ProcessModel):
         return Functions(coast, coast_jacobian, params, noise=acceleration_noise)
 
 
-def coast(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def coast(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Position advances by v·dt; p = [axes, q]."""
     axes = int(p[0])
     for i in range(axes):
@@ -92,7 +93,7 @@ def coast(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
         out[axes + i] = x[axes + i]
 
 
-def coast_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def coast_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """[[I, dt I], [0, I]]."""
     axes = int(p[0])
     d = 2 * axes
@@ -104,7 +105,7 @@ def coast_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa
         out[i * d + axes + i] = dt
 
 
-def acceleration_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def acceleration_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Add the exact covariance of white acceleration over dt."""
     axes = int(p[0])
     d = 2 * axes

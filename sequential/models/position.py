@@ -51,7 +51,9 @@ class Position(SensorModel):
         params = as_params(storage, tangent, manifold.dim, self.axes, arm)
         if isinstance(member, Vector):
             if member.size < self.axes or arm.any():
-                msg = f"Position(axes={self.axes}) with lever arm {self.lever_arm} cannot be read off {member}"
+                msg = (
+                    f"Position(axes={self.axes}) with lever arm {self.lever_arm} cannot be read off {member}"
+                )
                 raise ModelError(msg)
             return Functions(on_vector, on_vector_jacobian, params)
         if isinstance(member, SE2):
@@ -59,13 +61,13 @@ class Position(SensorModel):
         return Functions(on_body, on_body_jacobian, params, helpers=HELPERS)
 
 
-def on_vector(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def on_vector(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """First numbers of the vector; p = [storage, tangent, d, axes, arm (3)]."""
     for i in range(int(p[3])):
         out[i] = x[int(p[0]) + i]
 
 
-def on_vector_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def on_vector_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Identity on those numbers."""
     at, d, axes = int(p[1]), int(p[2]), int(p[3])
     for i in range(axes * d):
@@ -74,7 +76,7 @@ def on_vector_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # 
         out[i * d + at + i] = 1.0
 
 
-def on_plane(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def on_plane(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Antenna of a planar vehicle."""
     at = int(p[0])
     c, s = np.cos(x[at + 2]), np.sin(x[at + 2])
@@ -82,7 +84,7 @@ def on_plane(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG0
     out[1] = x[at + 1] + s * p[4] + c * p[5]
 
 
-def on_plane_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def on_plane_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Steps are in the body frame: the rotation, and the turned arm."""
     at, d = int(p[1]), int(p[2])
     heading = x[int(p[0]) + 2]
@@ -95,7 +97,7 @@ def on_plane_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # n
     out[d + at + 2] = c * p[4] - s * p[5]
 
 
-def on_body(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def on_body(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Antenna of a body in space."""
     at = int(p[0])
     r = rotation(x[at], x[at + 1], x[at + 2], x[at + 3])
@@ -103,7 +105,7 @@ def on_body(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG00
         out[i] = x[at + 4 + i] + r[3 * i] * p[4] + r[3 * i + 1] * p[5] + r[3 * i + 2] * p[6]
 
 
-def on_body_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def on_body_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """[-R [arm]x, R] on (rotation, position)."""
     at, t, d = int(p[0]), int(p[1]), int(p[2])
     r = rotation(x[at], x[at + 1], x[at + 2], x[at + 3])

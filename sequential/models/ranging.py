@@ -51,7 +51,9 @@ class Range(SensorModel):
     def __post_init__(self) -> None:
         object.__setattr__(self, "landmarks", _landmarks(self.landmarks, "Range"))
         object.__setattr__(self, "manifold", Vector(1))
-        object.__setattr__(self, "noise_cov", require_covariance(self.noise_cov, 1, "the noise_cov of a Range"))
+        object.__setattr__(
+            self, "noise_cov", require_covariance(self.noise_cov, 1, "the noise_cov of a Range")
+        )
 
     def functions(self, manifold: Manifold) -> Functions:
         """Lowered: see `SensorModel.functions`."""
@@ -71,7 +73,7 @@ class Range(SensorModel):
         return Functions(distance, distance_jacobian, params, 1)
 
 
-def distance(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def distance(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """p = [storage, tangent, d, planar, biases, bias storage, bias tangent, landmarks (2L)]; u = [index]."""
     at, k = int(p[0]), int(u[0])
     out[0] = math.hypot(p[7 + 2 * k] - x[at], p[8 + 2 * k] - x[at + 1])
@@ -81,7 +83,7 @@ def distance(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG0
         out[0] += x[int(p[5]) + k]
 
 
-def distance_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def distance_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Minus the unit vector to the landmark, in the body frame on SE(2)."""
     at, t, d, k = int(p[0]), int(p[1]), int(p[2]), int(u[0])
     for i in range(d):
@@ -125,7 +127,7 @@ class RangeBearing(SensorModel):
         return Functions(sighting, sighting_jacobian, params, 1)
 
 
-def sighting(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def sighting(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """p = [storage, tangent, d, landmarks (2L)]; u = [index]."""
     at, k = int(p[0]), int(u[0])
     dx, dy = p[3 + 2 * k] - x[at], p[4 + 2 * k] - x[at + 1]
@@ -134,7 +136,7 @@ def sighting(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG0
     out[1] = math.atan2(math.sin(bearing), math.cos(bearing))
 
 
-def sighting_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def sighting_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Rows (range, bearing), steps in the body frame."""
     at, t, d, k = int(p[0]), int(p[1]), int(p[2]), int(u[0])
     for i in range(2 * d):

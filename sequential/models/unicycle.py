@@ -76,7 +76,7 @@ def drive(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     out[at + 2] = math.atan2(math.sin(heading), math.cos(heading))
 
 
-def drive_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def drive_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Adjoint of the inverse arc on the pose, identity elsewhere."""
     at, d = int(p[1]), int(p[3])
     a, b, turn = arc(u, dt)
@@ -94,7 +94,7 @@ def drive_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa
     out[row + d + 2] = c * a + s * b
 
 
-def drive_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:  # noqa: ARG001
+def drive_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     """Variances that grow with time, distance and angle."""
     at, d = int(p[1]), int(p[3])
     distance, angle = abs(u[0]) * dt, abs(u[1]) * dt

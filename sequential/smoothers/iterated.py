@@ -70,6 +70,8 @@ class IteratedSmoother:
         converged = largest <= self.tolerance
         message = "" if converged else f"still moving by {largest:.2g} σ after {iteration} iterations"
         if not converged and self.check:
-            raise NotConvergedError(f"the iterated smoother is {message}; raise max_iterations or mend the start")
+            raise NotConvergedError(
+                f"the iterated smoother is {message}; raise max_iterations or mend the start"
+            )
         report = Report(self.name, converged, iteration, message=message or whole.message())
         return Run(problem.t, trajectory, cov, manifold, {}, float("nan"), report)

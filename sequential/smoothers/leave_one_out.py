@@ -31,7 +31,7 @@ def leave_one_out(problem: Problem, smoothed: Run, forward: Run | None = None) -
         residual, cov = np.empty((len(rows), m)), np.empty((len(rows), m, m))
         for k, reading in enumerate(rows):
             node = node_of[reading]
-            r, h = residual_and_jacobian(problem, sensor, name, reading, smoothed.mean[node])
+            r, h = residual_and_jacobian(problem, sensor, name, int(reading), smoothed.mean[node])
             residual[k], cov[k] = _without(r, h, smoothed.cov[node], sensor)
         accepted = np.ones(len(rows), bool) if forward is None else forward.innovations[name].accepted
         found[name] = Innovations(
@@ -56,7 +56,9 @@ def residual_and_jacobian(
     return residual, evaluate(f.jacobian, x, u, 0.0, f.params, m.dim * d).reshape(m.dim, d)
 
 
-def _without(r: np.ndarray, h: np.ndarray, cov: np.ndarray, sensor: SensorModel) -> tuple[np.ndarray, np.ndarray]:
+def _without(
+    r: np.ndarray, h: np.ndarray, cov: np.ndarray, sensor: SensorModel
+) -> tuple[np.ndarray, np.ndarray]:
     noise = sensor.noise_cov
     root = np.linalg.cholesky(noise)
     white = np.linalg.solve(root, h)

@@ -29,7 +29,7 @@ class RauchTungStriebel:
 
     @property
     def name(self) -> str:
-        """`ekf_rts`, `ukf_rts` …"""
+        """The filter's name with `_rts` behind it."""
         return f"{self.filter.name}_rts"
 
     def solve(self, problem: Problem) -> Run:
@@ -46,7 +46,9 @@ class RauchTungStriebel:
             table, forward.mean, forward.cov, before.mean, before.cov, before.transition, 1, mean, cov
         )
         seconds = forward.report.seconds + time.perf_counter() - began
-        report = Report(self.name, seconds=seconds, message=forward.report.message, rejected=forward.report.rejected)
+        report = Report(
+            self.name, seconds=seconds, message=forward.report.message, rejected=forward.report.rejected
+        )
         smoothed = Run(
             problem.t, mean, cov, forward.manifold, {}, forward.log_likelihood, report, forward.predicted
         )
