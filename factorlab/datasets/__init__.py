@@ -1,0 +1,49 @@
+"""Recordings by name: what may be used, what a result is scored against, and a model that fits.
+
+>>> from factorlab.datasets import load
+>>> (kitti,) = load("kitti", use_every=5)
+>>> len(kitti.log["gps"]), len(kitti.held_out)
+(93, 375)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from pathlib import Path
+
+from factorlab.datasets.dataset import Dataset, Truth
+from factorlab.datasets.kitti import load_kitti
+from sequential.errors import DataError
+
+__all__ = ["NAMES", "Dataset", "Truth", "load"]
+
+_LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
+    "kitti": lambda use_every, data, _robot: [load_kitti(use_every, data)],
+}
+NAMES = tuple(_LOADERS)
+
+
+def load(
+    name: str, *, use_every: int = 5, data: str | Path | None = None, robot: int | None = None
+) -> list[Dataset]:
+    """Load a recording by its name; one `Dataset` for each vehicle in it.
+
+    Parameters
+    ----------
+    name : one of `NAMES`
+    use_every : of the readings that can be held out, one in this many is used; 1 holds nothing out
+    data : folder of the files, where it is not the usual one
+    robot : only this vehicle, where the recording has several
+
+    Raises
+    ------
+    DataError
+        for an unknown name or missing files; the message says where they come from.
+    """
+    if name not in _LOADERS:
+        near = get_close_matches(name, NAMES, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        msg = f"there is no dataset {name!r}, only {', '.join(NAMES)}{hint}"
+        raise DataError(msg)
+    return _LOADERS[name](use_every, None if data is None else Path(data), robot)
