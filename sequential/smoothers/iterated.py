@@ -39,7 +39,7 @@ class IteratedSmoother:
     def solve(self, problem: Problem) -> Run:
         """Smooth the whole log; raises `NotConvergedError` unless `check` is False."""
         began = time.perf_counter()
-        start = RauchTungStriebel().solve(problem)
+        start = RauchTungStriebel(leave_one_out=False).solve(problem)
         run = self.refine(problem, start.mean)
         seconds = time.perf_counter() - began
         run = replace(run, report=replace(run.report, seconds=seconds), log_likelihood=start.log_likelihood)

@@ -1,0 +1,6 @@
+"""Factor graphs from the same declarations; the only room that imports GTSAM."""
+
+from factorlab.graph.batch import BatchGraph
+from factorlab.graph.incremental import FixedLagGraph, IncrementalGraph
+
+__all__ = ["BatchGraph", "FixedLagGraph", "IncrementalGraph"]

@@ -1,0 +1,168 @@
+"""The route for models without native factors: linearise in one compiled pass, solve with GTSAM.
+
+A Python factor inside a C++ optimiser costs time quadratic in the number of variables.  Here each node is
+one JacobianFactor that holds its move and its readings, already whitened, and the loop is ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from factorlab.graph.keys import STATIC, X
+from factorlab.graph.solve import readable
+from sequential.compile import compiled
+from sequential.errors import ModelError, NotConvergedError
+from sequential.timeline import Problem, sealed
+
+__all__ = ["ChainGraph", "static_directions"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+HALVINGS = 12
+
+
+def static_directions(problem: Problem) -> tuple[Ints, Ints]:
+    """Tangent directions that move and those that do not, from the model's `static` names."""
+    model = problem.model
+    fixed = np.zeros(model.manifold.dim, dtype=bool)
+    for name in model.static:
+        fixed[model.manifold.tangent(name)] = True  # type: ignore[attr-defined]
+    return sealed(np.flatnonzero(~fixed)), sealed(np.flatnonzero(fixed))
+
+
+@dataclass(eq=False)
+class ChainGraph:
+    """A problem as a linear factor graph, relinearised at will."""
+
+    problem: Problem
+
+    def __post_init__(self) -> None:
+        from sequential.kernels.linearize import Rows
+
+        self.moving, self.static = static_directions(self.problem)
+        self.whole = compiled(self.problem.model)
+        dims = np.array([s.manifold.dim for s in self.problem.model.sensors.values()] or [0])
+        plan, p = self.problem.schedule, len(self.moving)
+        per_reading = dims[plan.sensor] if len(plan.sensor) else np.zeros(0, dtype=np.int64)
+        readings = np.concatenate([[0], np.cumsum(per_reading)])[plan.reading_ptr]
+        moves = np.concatenate([[0], len(self.moving) + len(self.static) + p * np.arange(len(self.problem.t))])
+        first = (moves + readings).astype(np.int64)
+        total = int(first[-1])
+        shapes = ((total, p), (total, p), (total, max(1, len(self.static))), (total,))
+        self.rows = Rows(sealed(first), *(np.empty(shape) for shape in shapes))
+        self.units: dict[int, Any] = {}
+        self.keys = [X(k) for k in range(len(self.problem.t))]
+        names = [*self.keys, STATIC] if len(self.static) else self.keys
+        self.ordering = gtsam.Ordering()
+        for key in names:
+            self.ordering.push_back(key)
+
+    def linearise(self, trajectory: Array) -> float:
+        """Fill the rows at a trajectory (K, n); returns the cost there."""
+        from sequential.kernels.linearize import linearise_chain
+
+        prior = self.problem.model.prior
+        cost, singular = linearise_chain(
+            self.whole.tables, self.problem.schedule, prior.mean, prior.cov,
+            np.ascontiguousarray(trajectory), self.moving, self.static, self.rows,
+        )  # fmt: skip
+        self.whole.raise_failures()
+        if singular >= 0:
+            when = self.problem.t[singular] * 1e-9
+            msg = (
+                f"the process noise up to node {singular} ({when:.3f} s) is singular, so a graph cannot weigh "
+                "that step; declare parts that do not move as static=(…), or give the others some noise"
+            )
+            raise ModelError(msg)
+        return float(cost)
+
+    def linear_graph(self) -> Any:
+        """The rows as a `gtsam.GaussianFactorGraph`."""
+        graph = gtsam.GaussianFactorGraph()
+        first, before, here, fixed, right = self.rows
+        ends, static = first.tolist(), len(self.static) > 0
+        make, keys = gtsam.JacobianFactor, self.keys
+        for k, key in enumerate(keys):
+            a, b = ends[k], ends[k + 1]
+            unit = self._unit(b - a)
+            if k == 0:
+                fixed_part = (STATIC, fixed[a:b]) if static else ()
+                graph.push_back(make(key, here[a:b], *fixed_part, right[a:b], unit))
+            elif static:
+                graph.push_back(make(keys[k - 1], before[a:b], key, here[a:b], STATIC, fixed[a:b], right[a:b], unit))
+            else:
+                graph.push_back(make(keys[k - 1], before[a:b], key, here[a:b], right[a:b], unit))
+        return graph
+
+    def _unit(self, rows: int) -> Any:
+        if rows not in self.units:
+            self.units[rows] = gtsam.noiseModel.Unit.Create(rows)
+        return self.units[rows]
+
+    def step(self, graph: Any) -> Array:
+        """Solve the linear graph: (K, d) tangent steps."""
+        with readable(self.problem):
+            solution = graph.optimize(self.ordering)
+        nodes, p = len(self.keys), len(self.moving)
+        delta = np.zeros((nodes, p + len(self.static)))
+        delta[:, self.moving] = solution.vector(self.keys).reshape(nodes, p)
+        if len(self.static):
+            delta[:, self.static] = solution.at(STATIC)
+        return delta
+
+    def solve(
+        self, trajectory: Array, max_iterations: int, tolerance: float, *, check: bool
+    ) -> tuple[Array, float, int, float]:
+        """Gauss-Newton with step halving; returns trajectory, cost, iterations and the last largest step."""
+        manifold = self.problem.model.manifold
+        cost, largest = self.linearise(trajectory), np.inf
+        for iteration in range(1, max_iterations + 1):
+            delta = self.step(self.linear_graph())
+            scale = 1.0
+            for _ in range(HALVINGS):
+                trial = manifold.retract(trajectory, scale * delta)
+                reached = self.linearise(trial)
+                if reached <= cost * (1 + 1e-12) + 1e-12:
+                    break
+                scale /= 2
+            largest = scale * float(np.abs(delta).max())
+            gained, cost, trajectory = cost - reached, reached, trial
+            if largest < tolerance or gained < tolerance * max(1e-12, cost) * 1e-3:
+                return trajectory, cost, iteration, largest
+        if check:
+            msg = (
+                f"the graph still moves by {largest:.2g} after {max_iterations} iterations; "
+                "raise max_iterations or mend the start"
+            )
+            raise NotConvergedError(msg)
+        return trajectory, cost, max_iterations, largest
+
+    def covariances(self, graph: Any) -> Array:
+        """(K, d, d) marginals of every node, static directions included."""
+        zero = gtsam.VectorValues()
+        p = len(self.moving)
+        for key in self.keys:
+            zero.insert(key, np.zeros(p))
+        if len(self.static):
+            zero.insert(STATIC, np.zeros(len(self.static)))
+        marginals = gtsam.Marginals(graph, zero)
+        d = p + len(self.static)
+        cov = np.empty((len(self.keys), d, d))
+        order = np.concatenate([self.moving, self.static])
+        inverse = np.argsort(order)
+        for k, key in enumerate(self.keys):
+            if not len(self.static):
+                cov[k] = marginals.marginalCovariance(key)
+                continue
+            joint = marginals.jointMarginalCovariance([key, STATIC])
+            whole = np.block([[joint.at(a, b) for b in (key, STATIC)] for a in (key, STATIC)])
+            cov[k] = whole[np.ix_(inverse, inverse)]
+        return cov
+
+

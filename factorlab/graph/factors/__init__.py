@@ -1,0 +1,1 @@
+"""Native factors, one room for each kind of motion."""

@@ -1,0 +1,127 @@
+"""Solving, and checking what was solved: GTSAM's complaints become sentences."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import gtsam
+import numpy as np
+
+from factorlab.graph.keys import name_of
+from sequential.errors import NotConvergedError, SolverError, UnderConstrainedError
+from sequential.timeline import Problem
+
+__all__ = ["Solved", "optimise", "readable", "require_full_rank"]
+
+STIFF = 1e-3  # gradient per unit of (1 + cost) that still counts as settled
+WORDS = {"x": "the pose", "v": "the velocity", "b": "the IMU bias", "l": "the landmark", "s": "the static part"}
+
+
+def under_constrained(text: str, problem: Problem | None) -> str:
+    """A sentence from GTSAM's message about an indeterminate system."""
+    found = re.search(r"Symbol: (\w)(\d+)", text)
+    if not found:
+        key = re.search(r"variable\s+(\d+)", text)
+        name = name_of(int(key.group(1))) if key else "some variable"
+    else:
+        name = "".join(found.groups())
+    letter, digits = name[0], name[1:]
+    what = WORDS.get(letter, "a variable")
+    when = ""
+    if problem is not None and digits.isdigit() and int(digits) < len(problem.t) and letter in "xvb":
+        when = f" at {problem.t[int(digits)] * 1e-9:.3f} s"
+    return (
+        f"the graph leaves {name} ({what}{when}) free: no prior or measurement fixes it; "
+        "add a prior, an absolute sensor, or process noise that ties it to its neighbours"
+    )
+
+
+@contextmanager
+def readable(problem: Problem | None = None) -> Iterator[None]:
+    """Translate GTSAM's RuntimeErrors inside the block into the project's errors."""
+    try:
+        yield
+    except RuntimeError as error:
+        text = str(error)
+        if "ndeterminant" in text or "underconstrained" in text:
+            raise UnderConstrainedError(under_constrained(text, problem)) from error
+        if "does not exist" in text:
+            msg = f"a factor names a variable that has no initial value: {text.strip().splitlines()[0]}"
+            raise SolverError(msg) from error
+        msg = f"GTSAM could not solve the graph: {text.strip().splitlines()[0]}"
+        raise SolverError(msg) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """Values at the optimum and how they were reached."""
+
+    values: Any
+    cost: float
+    iterations: int
+    gradient: float
+
+
+def require_full_rank(linear: Any, problem: Problem | None = None) -> None:
+    """Raise `UnderConstrainedError` where a linear graph leaves a variable free.
+
+    Levenberg-Marquardt returns happily from such a graph, with a gauge of its own making.
+    """
+    with readable(problem):
+        linear.optimize()
+
+
+def optimise(
+    graph: Any,
+    start: Any,
+    problem: Problem | None = None,
+    max_iterations: int = 50,
+    *,
+    check: bool = True,
+) -> Solved:
+    """Gauss-Newton, and Levenberg-Marquardt from where it began if the cost would not fall.
+
+    Raises
+    ------
+    UnderConstrainedError, NotConvergedError, SolverError
+    """
+    with readable(problem):
+        parameters = gtsam.GaussNewtonParams()
+        parameters.setMaxIterations(max_iterations)
+        parameters.setRelativeErrorTol(1e-9)
+        optimizer = gtsam.GaussNewtonOptimizer(graph, start, parameters)
+        before = graph.error(start)
+        values = optimizer.optimize()
+        cost, iterations = optimizer.error(), optimizer.iterations()
+        if not np.isfinite(cost) or cost > before:
+            values, cost, iterations = damped(graph, start, max_iterations)
+        linear = graph.linearize(values)
+    require_full_rank(linear, problem)
+    gradient = largest_gradient(linear)
+    if check and (iterations == 0 or gradient > STIFF * (1.0 + cost)) and iterations >= max_iterations:
+        msg = (
+            f"the solver stopped after {iterations} iterations with gradient {gradient:.3g} at cost {cost:.6g}; "
+            "raise max_iterations or mend the start"
+        )
+        raise NotConvergedError(msg)
+    return Solved(values, cost, iterations, gradient)
+
+
+def damped(graph: Any, start: Any, max_iterations: int) -> tuple[Any, float, int]:
+    """Levenberg-Marquardt."""
+    parameters = gtsam.LevenbergMarquardtParams()
+    parameters.setMaxIterations(max_iterations)
+    parameters.setRelativeErrorTol(1e-9)
+    optimizer = gtsam.LevenbergMarquardtOptimizer(graph, start, parameters)
+    values = optimizer.optimize()
+    return values, optimizer.error(), optimizer.iterations()
+
+
+def largest_gradient(linear: Any) -> float:
+    """Largest entry of the gradient of a linear graph at zero."""
+    gradient = linear.gradientAtZero()
+    return float(np.abs(gradient.vector()).max())
