@@ -13,7 +13,12 @@
 """
 
 from sequential.errors import FactorlabError
-from sequential.filters import ExtendedKalmanFilter, IteratedExtendedKalmanFilter, KalmanFilter
+from sequential.filters import (
+    ExtendedKalmanFilter,
+    IteratedExtendedKalmanFilter,
+    KalmanFilter,
+    UnscentedKalmanFilter,
+)
 from sequential.history import Innovations, Prediction, Report, Run
 from sequential.log import SensorLog, Stream
 from sequential.manifold import SE2, SE3, SO2, SO3, NavState, Product, Vector
@@ -73,6 +78,7 @@ __all__ = [
     "Strapdown",
     "Stream",
     "Unicycle",
+    "UnscentedKalmanFilter",
     "Vector",
     "diagonal",
     "inertial_state",

@@ -2,5 +2,6 @@
 
 from sequential.filters.extended import ExtendedKalmanFilter, IteratedExtendedKalmanFilter
 from sequential.filters.kalman import KalmanFilter
+from sequential.filters.unscented import UnscentedKalmanFilter
 
-__all__ = ["ExtendedKalmanFilter", "IteratedExtendedKalmanFilter", "KalmanFilter"]
+__all__ = ["ExtendedKalmanFilter", "IteratedExtendedKalmanFilter", "KalmanFilter", "UnscentedKalmanFilter"]

@@ -60,7 +60,7 @@ def filter_problem(problem: Problem, name: str, iterations: int, *, keep: bool) 
     )
     seconds = time.perf_counter() - began
     whole.raise_failures()
-    require_solved(problem, failed)
+    require_solved(problem, failed, out)
     require_finite(problem, out.mean)
     rejected = int((out.accepted == 0).sum())
     report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sequential.errors import NotPositiveDefiniteError
+from sequential.errors import NotFiniteError, NotPositiveDefiniteError
 from sequential.history import Innovations, Prediction, Report, Run
 from sequential.timeline import Problem
 
@@ -31,29 +31,50 @@ def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:
     )
 
 
-def require_solved(problem: Problem, failed: int) -> None:
-    """Raise where a kernel met an innovation covariance that is not positive definite."""
-    if failed < 0:
+def require_solved(problem: Problem, failed: int, filtered: Any = None) -> None:
+    """Raise where a kernel stopped: `failed` is -1, the reading it stopped at, or -2 minus the node.
+
+    Raises
+    ------
+    NotFiniteError
+        where a model function returned NaN; needs the kernel's arrays.
+    NotPositiveDefiniteError
+        where a covariance was not positive definite.
+    """
+    if failed == -1:
         return
-    name = list(problem.model.sensors)[problem.schedule.sensor[failed]]
-    when = problem.reading_t[failed] * 1e-9
-    msg = (
-        f"the innovation covariance of {name!r} is not positive definite at {when:.6f} s "
-        f"(reading {problem.reading_row[failed]}): the state has diverged, or noise_cov is far below the "
+    if failed < 0:
+        node = -2 - failed
+        what, when = "the predicted covariance", problem.t[node] * 1e-9
+        where = f"at {when:.6f} s"
+    else:
+        node = int(np.searchsorted(problem.t, problem.reading_t[failed]))
+        name = list(problem.model.sensors)[problem.schedule.sensor[failed]]
+        what, when = f"the innovation covariance of {name!r}", problem.reading_t[failed] * 1e-9
+        where = f"at {when:.6f} s (reading {problem.reading_row[failed]})"
+    if filtered is not None:
+        seen = [filtered.mean[node], filtered.cov[node]]
+        if failed >= 0:
+            seen += [filtered.residual[failed], filtered.residual_cov[failed]]
+        if not all(np.isfinite(values).all() for values in seen):
+            raise NotFiniteError(
+                f"{what} is not finite {where}: a model function returned NaN or infinity there, or the "
+                "state diverged; evaluate step and observe at the estimate before it"
+            )
+    raise NotPositiveDefiniteError(
+        f"{what} is not positive definite {where}: the state has diverged, or noise_cov is far below the "
         "rounding of the predicted covariance; widen the prior or the noise"
     )
-    raise NotPositiveDefiniteError(msg)
 
 
 def require_finite(problem: Problem, mean: np.ndarray) -> None:
-    """Raise where an estimate is not finite."""
+    """Raise `NotFiniteError` where an estimate is not finite."""
     bad = np.flatnonzero(~np.isfinite(mean).all(axis=1))
     if len(bad):
-        msg = (
+        raise NotFiniteError(
             f"the estimate is no longer finite from {problem.t[bad[0]] * 1e-9:.6f} s on: "
-            "a model function returned NaN or the state diverged"
+            "a model function returned NaN or infinity, or the state diverged"
         )
-        raise NotPositiveDefiniteError(msg)
 
 
 def collect_innovations(problem: Problem, filtered: Any) -> Mapping[str, Innovations]:

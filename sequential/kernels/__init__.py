@@ -17,7 +17,10 @@ import numba
 __all__ = ["cache_folder"]
 
 INLINED = (
+    "kernels/belief.py",
     "kernels/call.py",
+    "kernels/extended.py",
+    "kernels/records.py",
     "kernels/matrices.py",
     "kernels/charts.py",
     "kernels/poses.py",

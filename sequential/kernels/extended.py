@@ -74,12 +74,12 @@ def absorb(model, plan, reading, x, p, iterations, update, work, expected, resid
     measure(model, plan, reading, x, 0, expected, residual)
     sensor_jacobian(model, plan, reading, x, 0, expected, flat, h)
     nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
-    if nis < 0.0:
-        return math.nan
     for i in range(m):
         out.residual[reading, i] = residual[i]
         for j in range(m):
             out.residual_cov[reading, i, j] = innovation_cov[i, j]
+    if nis < 0.0:
+        return math.nan
     if nis > model.gate[s]:
         out.accepted[reading] = 0
         return 0.0
@@ -162,6 +162,8 @@ def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
         for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
             gain_log = absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out)
             if math.isnan(gain_log):
+                out.mean[node] = x
+                out.cov[node] = p
                 return log_likelihood, reading
             log_likelihood += gain_log
         out.mean[node] = x
