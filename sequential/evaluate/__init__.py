@@ -1,0 +1,44 @@
+"""How good an estimate is, and whether it knows: NIS, NEES, whiteness, ATE, RPE."""
+
+from sequential.evaluate.alignment import Alignment, align, umeyama
+from sequential.evaluate.bootstrap import BootstrapBand, block_bootstrap, gap_labels
+from sequential.evaluate.consistency import (
+    AverageNees,
+    Consistency,
+    anees,
+    chi2_band,
+    nees,
+    nis_summary,
+    normalised_error,
+    summarise,
+)
+from sequential.evaluate.pose_error import PoseErrors, ape, rpe, statistics
+from sequential.evaluate.trajectory import Trajectory, associate, interpolate
+from sequential.evaluate.whiteness import Whiteness, autocorrelation, whiteness
+
+__all__ = [
+    "Alignment",
+    "AverageNees",
+    "BootstrapBand",
+    "Consistency",
+    "PoseErrors",
+    "Trajectory",
+    "Whiteness",
+    "align",
+    "anees",
+    "ape",
+    "associate",
+    "autocorrelation",
+    "block_bootstrap",
+    "chi2_band",
+    "gap_labels",
+    "interpolate",
+    "nees",
+    "nis_summary",
+    "normalised_error",
+    "rpe",
+    "statistics",
+    "summarise",
+    "umeyama",
+    "whiteness",
+]
