@@ -1,0 +1,179 @@
+"""`factorlab compare`: estimators side by side on a dataset or on a log of your own."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from factorlab.cli.faults import CHECK_FAILED, DATA_ERROR, in_one_sentence
+from factorlab.cli.settings import as_json, config_option, print_json, seed_option
+
+if TYPE_CHECKING:
+    from factorlab.compare import Comparison
+    from factorlab.datasets import Dataset
+
+__all__ = ["Settings", "compare", "compare_and_show"]
+
+FOLDER = click.Path(file_okay=True, path_type=Path)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the command line asks for."""
+
+    source: str
+    estimators: str | None = None
+    use_every: int | None = None
+    tune: bool = False
+    model: str | None = None
+    truth: Path | None = None
+    robot: int | None = None
+    max_gap: float | None = None
+    as_json: bool = False
+    out: Path | None = None
+    force: bool = False
+    seed: int = 0
+    check: bool = False
+
+
+@click.command(short_help="Estimators side by side on one log.")
+@click.argument("source", metavar="DATASET|LOG")
+@click.option("--estimators", metavar="A,B", help="Names, such as ekf,ieks,batch; by default those that fit.")
+@click.option(
+    "--use-every",
+    type=click.IntRange(min=1),
+    metavar="K",
+    help="Use one reading in K, score on the others.  [default: 5 for a dataset, 1 for a log]",
+)
+@click.option("--tune", is_flag=True, help="Fit the noise first, on the readings in use only; show both tables.")
+@click.option("--model", metavar="FILE.py:NAME", help="For a log of your own: a StateSpace, or a function that returns one.")
+@click.option("--truth", type=click.Path(path_type=Path), metavar="TUM_FILE", help="For a log of your own: where it really was.")
+@click.option("--robot", type=int, metavar="N", help="Only this robot, where a dataset has several.")
+@click.option("--max-gap", type=click.FloatRange(min=0, min_open=True), metavar="S", help="Longest pause of the input to bridge, s.")
+@as_json
+@click.option("-o", "--out", type=FOLDER, metavar="DIR", help="Write report.html, report.json and trajectories here.")
+@click.option("--force", is_flag=True, help="Write over an earlier report in DIR.")
+@seed_option
+@click.option("--check", is_flag=True, help="Exit with 3 when a finding is FAIL.")
+@config_option
+@in_one_sentence
+def compare(**options: Any) -> int:  # noqa: ANN401 - one keyword an option
+    """Run several estimators on one log and put them in one table.
+
+    DATASET is kitti, plaza1, plaza2 or mrclam; LOG is a CSV or NPZ file with named streams, together
+    with --model.  `factorlab info LOG` shows what a log holds.
+    """
+    return compare_and_show(Settings(**options))
+
+
+def compare_and_show(settings: Settings) -> int:
+    """Compare, write, print; returns the exit code."""
+    from factorlab.compare import compare as run_comparison
+    from factorlab.compare import document
+    from factorlab.report.folder import require_free
+
+    names = _names(settings.estimators)
+    if settings.out is not None:
+        require_free(settings.out, force=settings.force)
+    datasets = _datasets(settings)
+    comparisons = []
+    for dataset in datasets:
+        with _progress(dataset.name) as progress:
+            comparisons.append(
+                run_comparison(
+                    dataset,
+                    names,
+                    tune=settings.tune,
+                    seed=settings.seed,
+                    max_gap=settings.max_gap,
+                    progress=progress,
+                )
+            )
+    done = tuple(comparisons)
+    whole = document(done, _command())
+    _print(done, whole, as_json=settings.as_json)
+    if settings.out is not None:
+        from factorlab.report import write_report
+
+        page = write_report(done, whole, settings.out, force=settings.force)
+        click.echo(f"report: {page}", err=settings.as_json)
+    return _exit_code(done, check=settings.check)
+
+
+def _names(given: str | None) -> tuple[str, ...] | None:
+    """Names of estimators; a wrong one is a usage error."""
+    if given is None:
+        return None
+    from factorlab.compare.estimators import UnknownEstimatorError, require_names
+
+    try:
+        return require_names(tuple(name.strip() for name in given.split(",") if name.strip()))
+    except UnknownEstimatorError as error:
+        raise click.BadParameter(str(error), param_hint="--estimators") from error
+
+
+def _datasets(settings: Settings) -> list[Dataset]:
+    """The named dataset, or the user's own log."""
+    from factorlab.datasets import NAMES, load
+
+    if settings.source in NAMES:
+        for option, given in (("--model", settings.model), ("--truth", settings.truth)):
+            if given is not None:
+                raise click.UsageError(f"{option} goes with a log of your own; {settings.source} brings its own")
+        use_every = 5 if settings.use_every is None else settings.use_every
+        return load(settings.source, use_every=use_every, robot=settings.robot)
+    from factorlab.compare.own import own_dataset, require_log
+
+    path = require_log(settings.source, NAMES)
+    if settings.robot is not None:
+        raise click.UsageError("--robot goes with a dataset that has several, not with a log of your own")
+    if settings.model is None:
+        raise click.UsageError(f"a log of your own needs a model: factorlab compare {path} --model FILE.py:NAME")
+    return [own_dataset(path, settings.model, settings.truth, settings.use_every or 1)]
+
+
+def _progress(name: str) -> Any:  # noqa: ANN401 - a context manager that gives a Progress
+    from factorlab.cli.progress import bar
+
+    return bar(name, shown=sys.stderr.isatty())
+
+
+def _print(comparisons: tuple[Comparison, ...], whole: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        print_json(whole)
+        return
+    from factorlab.compare.text import terminal
+
+    for comparison in comparisons:
+        for line in terminal(comparison):
+            click.echo(_coloured(line))
+        click.echo()
+
+
+def _coloured(line: str) -> str:
+    colours = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
+    import os
+
+    if line[:4] in colours and "NO_COLOR" not in os.environ:
+        return click.style(line[:4], fg=colours[line[:4]], bold=True) + line[4:]
+    return line
+
+
+def _command() -> str:
+    """The command line, as it can be typed again."""
+    import shlex
+
+    return shlex.join(["factorlab", *sys.argv[1:]])
+
+
+def _exit_code(comparisons: tuple[Comparison, ...], *, check: bool) -> int:
+    if all(comparison.all_failed for comparison in comparisons):
+        reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)
+        click.echo(f"error: no estimator succeeded: {'; '.join(reasons)}", err=True)
+        return DATA_ERROR
+    failed = any(finding.status == "FAIL" for comparison in comparisons for finding in comparison.findings)
+    return CHECK_FAILED if check and failed else 0

@@ -1,0 +1,49 @@
+"""`factorlab doctor`: is everything here that a run needs?"""
+
+from __future__ import annotations
+
+import os
+import platform
+from pathlib import Path
+
+import click
+
+from factorlab.cli.faults import DATA_ERROR, in_one_sentence
+from factorlab.cli.settings import as_json, print_json
+
+__all__ = ["doctor"]
+
+
+@click.command(short_help="Versions, data and browser found on this machine.")
+@as_json
+@in_one_sentence
+def doctor(as_json: bool) -> int:  # noqa: FBT001 - click passes flags by name
+    """Say what is installed, where the recordings are, and what is missing; exits with 1 if anything needed is."""
+    from factorlab.versions import versions
+
+    found = versions()
+    missing = [name for name, version in found.items() if version == "missing"]
+    places = {"platform": platform.platform(), "cores": str(os.cpu_count()), **_places()}
+    if as_json:
+        print_json({"schema": 1, "versions": found, "places": places, "missing": missing})
+    else:
+        for name, value in {**found, **places}.items():
+            click.echo(f"{name:<16} {value}")
+        if missing:
+            click.echo(f"missing: pip install {' '.join(missing)}")
+    return DATA_ERROR if missing else 0
+
+
+def _places() -> dict[str, str]:
+    from factorlab.datasets.wheel import gtsam_data
+    from sequential.errors import DataError
+
+    try:
+        wheel = str(gtsam_data())
+    except DataError as error:
+        wheel = str(error)
+    data = os.environ.get("FACTORLAB_DATA")
+    folder = "not set: mrclam is not available" if not data else data
+    if data and not Path(data).is_dir():
+        folder = f"{data} is not a folder"
+    return {"kitti, plaza": wheel, "FACTORLAB_DATA": folder}

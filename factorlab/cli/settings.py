@@ -1,0 +1,76 @@
+"""Options that several commands share, and the TOML file that may give them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import click
+
+__all__ = ["Command", "as_json", "config_option", "print_json", "seed_option"]
+
+Command = Callable[..., Any]
+
+as_json = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout, all else on stderr.")
+seed_option = click.option("--seed", type=int, default=0, show_default=True, help="Seed of resampled bands.")
+
+
+def config_option(command: Command) -> Command:
+    """Give a command `--config FILE.toml`, whose keys are the names of its options."""
+    return click.option(
+        "--config",
+        type=click.Path(dir_okay=False, path_type=Path),
+        is_eager=True,
+        expose_value=False,
+        callback=_read,
+        metavar="FILE.toml",
+        help="Options from a file: use_every = 5, estimators = ['ekf', 'batch'] …; the command line wins.",
+    )(command)
+
+
+def _read(context: click.Context, parameter: click.Parameter, path: Path | None) -> None:
+    if path is None:
+        return
+    import tomllib
+
+    try:
+        given = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise click.BadParameter(f"{path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise click.BadParameter(f"{path} is not TOML: {error}") from error
+    known = _known(context.command)
+    values = {}
+    for key, value in given.items():
+        name = known.get(key.replace("-", "_"))
+        if name is None:
+            raise click.BadParameter(f"{path}: unknown key {key!r}{did_you_mean(key, known)}")
+        values[name] = ",".join(map(str, value)) if isinstance(value, list) else value
+    context.default_map = {**(context.default_map or {}), **values}
+
+
+def _known(command: click.Command) -> dict[str, str]:
+    """Names that a file may use, each with the parameter it stands for."""
+    known = {}
+    for parameter in command.params:
+        if parameter.name is None or parameter.name in {"config", "help", "debug"}:
+            continue
+        for option in (*parameter.opts, parameter.name):
+            if len(option) > 2:
+                known[option.lstrip("-").replace("-", "_")] = parameter.name
+    return known
+
+
+def did_you_mean(key: str, known: Any) -> str:
+    """`; did you mean …?`, or the whole list where nothing is near."""
+    near = get_close_matches(key, list(known), n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(known))}"
+
+
+def print_json(document: Any) -> None:
+    """The one document on stdout: strict JSON, no NaN."""
+    import json
+
+    click.echo(json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False))

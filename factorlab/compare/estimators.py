@@ -1,0 +1,81 @@
+"""The estimators by the names that tables, JSON and the command line use."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import NamedTuple
+
+from sequential import (
+    ExtendedKalmanFilter,
+    IteratedExtendedKalmanFilter,
+    IteratedSmoother,
+    KalmanFilter,
+    RauchTungStriebel,
+)
+from sequential.errors import ModelError
+from sequential.run import Estimator
+
+__all__ = ["EVERY_NAME", "KINDS", "NAMES", "Kind", "UnknownEstimatorError", "make", "require_names"]
+
+
+class Kind(NamedTuple):
+    """What a row of the table says about its estimator."""
+
+    title: str
+    online: bool  # an estimate at t uses readings up to t only
+    graph: bool
+
+
+KINDS = {
+    "ekf": Kind("EKF", True, False),
+    "iekf": Kind("iterated EKF", True, False),
+    "ukf": Kind("UKF", True, False),
+    "ekf_rts": Kind("EKF + RTS", False, False),
+    "ieks": Kind("iterated smoother", False, False),
+    "fixed_lag": Kind("fixed lag 5.5 s", True, True),
+    "isam2": Kind("iSAM2, online", True, True),
+    "isam2_final": Kind("iSAM2, at the end", False, True),
+    "batch": Kind("batch graph", False, True),
+    "kf": Kind("Kalman filter", True, False),
+}
+NAMES = tuple(name for name in KINDS if name != "kf")
+EVERY_NAME = tuple(KINDS)
+
+
+class UnknownEstimatorError(ModelError):
+    """A name that no estimator has."""
+
+
+def require_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names, once each; `UnknownEstimatorError` for one that no estimator has."""
+    for name in names:
+        if name not in KINDS:
+            near = get_close_matches(name, EVERY_NAME, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(EVERY_NAME)}"
+            msg = f"no estimator is called {name!r}; {hint}"
+            raise UnknownEstimatorError(msg)
+    if not names:
+        msg = f"a comparison needs an estimator; there are {', '.join(EVERY_NAME)}"
+        raise UnknownEstimatorError(msg)
+    return tuple(dict.fromkeys(names))
+
+
+def make(name: str) -> Estimator:
+    """The estimator of a name, with the settings that a comparison uses; gtsam is imported for graphs only."""
+    if KINDS[name].graph:
+        from factorlab.graph import BatchGraph, FixedLagGraph, IncrementalGraph
+
+        if name == "fixed_lag":
+            return FixedLagGraph(lag=5.5)
+        return BatchGraph() if name == "batch" else IncrementalGraph(final=name == "isam2_final")
+    if name == "ukf":
+        from sequential import UnscentedKalmanFilter
+
+        return UnscentedKalmanFilter()
+    return {
+        "kf": KalmanFilter,
+        "ekf": ExtendedKalmanFilter,
+        "iekf": IteratedExtendedKalmanFilter,
+        "ekf_rts": RauchTungStriebel,
+        "ieks": IteratedSmoother,
+    }[name]()

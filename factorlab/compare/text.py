@@ -1,0 +1,137 @@
+"""Numbers as a table writes them, for the terminal and for the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from factorlab.compare.table import Comparison, Row, Tuned
+from factorlab.compare.verdict import Finding
+
+__all__ = ["band", "cells", "figure", "headings", "terminal", "tuning_lines"]
+
+NOTHING = "–"
+
+
+def figure(value: float | None, digits: int = 3) -> str:
+    """A number with `digits` significant digits, without an exponent where it reads well without."""
+    if value is None or value != value:  # noqa: PLR0124 - NaN
+        return NOTHING
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        text = f"{value:.{digits}g}"
+        return f"{value:.0f}" if "e" in text else text
+    return f"{value:.{digits - 1}e}"
+
+
+def band(limits: tuple[float, float] | None) -> str:
+    """`2.5 – 3.5`, or nothing."""
+    return "" if limits is None else f"{figure(limits[0])} – {figure(limits[1])}"
+
+
+def headings(comparison: Comparison) -> tuple[tuple[str, str], ...]:
+    """Heading and unit (or what is expected) of each column."""
+    first = next((row for row in comparison.rows if row.errors is not None), None)
+    errors = None if first is None else first.errors
+    against = {"held-out": "held-out RMSE", "truth": "RMSE to truth"}.get(errors.against if errors else "", "RMSE")
+    honest = "" if first is None or first.normalised_error is None else first.normalised_error
+    innovations = next((row.nis for row in comparison.rows if row.nis is not None), None)
+    return (
+        ("estimator", ""),
+        (against, "m" if errors is None or errors.metres else "sensor's unit"),
+        ("norm. error", f"{figure(honest.expected)} exp." if honest else ""),
+        ("median", f"{figure(honest.median_expected)} exp." if honest else ""),
+        ("band per gap" if errors and errors.against == "held-out" else "band per block", "95 %"),
+        ("tail", "5 % exp."),
+        ("NIS", f"{figure(innovations.expected)} exp." if innovations else ""),
+        ("its band", "95 %"),
+        ("median", ""),
+        ("per reading", "µs"),
+        ("total", "s"),
+        ("iter.", ""),
+    )
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """One string for each of `headings`; the NIS of a smoother is marked ° for leave-one-out."""
+    honest, nis = row.normalised_error, row.nis
+    mark = "°" if nis is not None and nis.kind != "filter" else ""
+    return (
+        row.title,
+        figure(row.rmse, 4),
+        figure(honest.mean) if honest else NOTHING,
+        figure(honest.median) if honest else NOTHING,
+        (band(honest.bootstrap_band95) if honest else "") or NOTHING,
+        f"{100 * honest.tail_share:.0f} %" if honest else NOTHING,
+        f"{figure(nis.mean)}{mark}" if nis else NOTHING,
+        band(nis.band95) if nis else NOTHING,
+        figure(nis.median) if nis else NOTHING,
+        figure(row.us_per_measurement),
+        figure(row.seconds),
+        NOTHING if row.iterations is None else str(row.iterations),
+    )
+
+
+def tuning_lines(tuned: Tuned) -> tuple[tuple[str, str, str, str, str], ...]:
+    """Knob, before, after, factor, interval."""
+    lines = []
+    for name, value in tuned.values.items():
+        before, unit = tuned.initial[name], tuned.units.get(name, "")
+        interval = band(tuned.intervals.get(name)) or NOTHING
+        ratio = f"×{figure(value / before)}" if before else NOTHING
+        lines.append((name, f"{figure(before)} {unit}".strip(), f"{figure(value)} {unit}".strip(), ratio, interval))
+    return tuple(lines)
+
+
+def terminal(comparison: Comparison) -> Iterable[str]:
+    """The verdict, then the table (before and after, when tuned), line by line."""
+    yield comparison.dataset.title
+    yield ""
+    yield from _verdict(comparison.findings)
+    if comparison.tuned is not None:
+        yield from _table(comparison, comparison.untuned, "noise as shipped")
+        yield from _tuning(comparison.tuned)
+        yield from _table(comparison, comparison.rows, "noise tuned on the readings in use")
+    else:
+        yield from _table(comparison, comparison.rows, "")
+    if any(row.nis is not None and row.nis.kind != "filter" for row in comparison.rows):
+        yield "° leave-one-out: each reading predicted from all the others, before and after"
+    yield from (f"- {note}" for note in comparison.dataset.notes)
+
+
+def _verdict(findings: tuple[Finding, ...]) -> Iterable[str]:
+    if not findings:
+        return
+    widest = max(len(finding.metric) for finding in findings)
+    for finding in findings:
+        limits = f" [{band(finding.band95)}]" if finding.band95 else ""
+        value = f"{figure(finding.value)}{limits}: " if finding.value is not None else ""
+        remedy = "" if finding.status == "PASS" else f"; {finding.action}"
+        yield f"{finding.status}  {finding.metric:<{widest}}  {value}{finding.meaning}{remedy}"
+    yield ""
+
+
+def _table(comparison: Comparison, rows: tuple[Row, ...], title: str) -> Iterable[str]:
+    names, units = zip(*headings(comparison), strict=True)
+    body = [cells(row) for row in rows if not row.failed]
+    lines = [tuple(names), tuple(units), *body]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(names))]
+    if title:
+        yield f"{title}:"
+    for line in lines:
+        first, *rest = (cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(line, widths, strict=True)))
+        yield "  ".join((first, *rest)).rstrip()
+    for row in rows:
+        if row.failed or row.message:
+            yield f"{row.title}: {row.message}"
+    yield ""
+
+
+def _tuning(tuned: Tuned) -> Iterable[str]:
+    yield f"tuned in {figure(tuned.seconds, 2)} s, {tuned.evaluations} evaluations of the likelihood:"
+    lines = tuning_lines(tuned)
+    widths = [max(len(line[k]) for line in lines) for k in range(4)]
+    for name, before, after, ratio, interval in lines:
+        arrow = f"  {name.ljust(widths[0])}  {before.rjust(widths[1])} -> {after.rjust(widths[2])}"
+        yield f"{arrow}  {ratio.rjust(widths[3])}" + (f"  [{interval}]" if interval != NOTHING else "")
+    if tuned.message:
+        yield f"  {tuned.message}"
+    yield ""

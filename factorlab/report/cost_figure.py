@@ -1,0 +1,39 @@
+"""Accuracy against time."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from factorlab.compare import Comparison, Row
+from factorlab.report.style import LINES, blank, legend_below, log_axis
+
+__all__ = ["cost"]
+
+
+def cost(comparison: Comparison) -> Figure | None:
+    """One mark an estimator: time of a reading, and RMSE; hollow before tuning, full after."""
+    rows = [row for row in comparison.rows if row.rmse is not None and row.us_per_measurement is not None]
+    if not rows:
+        return None
+    figure, axes = blank(4.0)
+    one = axes[0, 0]
+    before = {row.name: row for row in comparison.untuned if row.rmse is not None}
+    for row in rows:
+        if row.name in before:
+            _mark(one, before[row.name], hollow=True)
+            earlier = before[row.name]
+            one.plot([earlier.us_per_measurement, row.us_per_measurement], [earlier.rmse, row.rmse],
+                     color=LINES[row.name]["color"], linewidth=0.5, alpha=0.6)
+        _mark(one, row, hollow=False)
+    log_axis(one, "xy")
+    unit = "m" if rows[0].errors is not None and rows[0].errors.metres else "sensor's unit"
+    one.set(xlabel="time for each reading, µs", ylabel=f"RMSE, {unit}")
+    one.set_title("hollow: noise as shipped, full: tuned" if before else "lower is more accurate, left is faster")
+    legend_below(figure, one)
+    return figure
+
+
+def _mark(axes, row: Row, *, hollow: bool) -> None:  # noqa: ANN001
+    look = LINES[row.name]
+    axes.plot([row.us_per_measurement], [row.rmse], look["marker"], color=look["color"], markersize=9,
+              markerfacecolor="none" if hollow else look["color"], label=None if hollow else row.title)
