@@ -41,6 +41,7 @@ from sequential.noise import ImuNoise, diagonal
 from sequential.run import Estimator, run
 from sequential.smoothers import IteratedSmoother, RauchTungStriebel
 from sequential.timeline import Problem, prepare
+from sequential.tuning import Knob, Tuning, tune
 
 __all__ = [
     "SE2",
@@ -58,6 +59,7 @@ __all__ = [
     "IteratedExtendedKalmanFilter",
     "IteratedSmoother",
     "KalmanFilter",
+    "Knob",
     "LinearSensor",
     "Loss",
     "NavState",
@@ -77,6 +79,7 @@ __all__ = [
     "StateSpace",
     "Strapdown",
     "Stream",
+    "Tuning",
     "Unicycle",
     "UnscentedKalmanFilter",
     "Vector",
@@ -84,4 +87,5 @@ __all__ = [
     "inertial_state",
     "prepare",
     "run",
+    "tune",
 ]
