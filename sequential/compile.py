@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import ctypes
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -124,9 +124,8 @@ def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: 
         return 0
     if not isinstance(raw, Plain):
         return int(_built_in(raw, functions.helpers).address)
-    try:
-        made = _compile_plain(raw, sizes[0], sizes[1])
-    except Exception:  # noqa: BLE001 - Numba refuses in many ways; all of them mean the same here
+    made = _compiled_or_none(raw, sizes[0], sizes[1]) if isinstance(raw.function, Hashable) else None
+    if made is None:
         whole.interpreted.append(name)
         made = _interpret(whole, raw, sizes)
         whole.alive.append(made)
@@ -145,6 +144,15 @@ def _built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...])
     for helper in helpers:
         register_jitable(helper)
     return cfunc(MODEL_SIGNATURE, cache=True, error_model="numpy")(raw)
+
+
+@lru_cache(maxsize=256)
+def _compiled_or_none(raw: Plain, n: int, inputs: int) -> Any:
+    """A user's function compiled once, however many models it appears in; None where Numba refuses."""
+    try:
+        return _compile_plain(raw, n, inputs)
+    except Exception:  # noqa: BLE001 - Numba refuses in many ways; all of them mean the same here
+        return None
 
 
 def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:

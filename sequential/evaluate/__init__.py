@@ -1,6 +1,7 @@
 """How good an estimate is, and whether it knows: NIS, NEES, whiteness, ATE, RPE."""
 
 from sequential.evaluate.alignment import Alignment, align, umeyama
+from sequential.evaluate.blame import Blame, Candidate, blame
 from sequential.evaluate.bootstrap import BootstrapBand, block_bootstrap, gap_labels
 from sequential.evaluate.consistency import (
     AverageNees,
@@ -12,6 +13,7 @@ from sequential.evaluate.consistency import (
     normalised_error,
     summarise,
 )
+from sequential.evaluate.diagnose import Finding, diagnose
 from sequential.evaluate.pose_error import PoseErrors, ape, rpe, statistics
 from sequential.evaluate.trajectory import Trajectory, associate, interpolate
 from sequential.evaluate.whiteness import Whiteness, autocorrelation, whiteness
@@ -19,8 +21,11 @@ from sequential.evaluate.whiteness import Whiteness, autocorrelation, whiteness
 __all__ = [
     "Alignment",
     "AverageNees",
+    "Blame",
     "BootstrapBand",
+    "Candidate",
     "Consistency",
+    "Finding",
     "PoseErrors",
     "Trajectory",
     "Whiteness",
@@ -29,8 +34,10 @@ __all__ = [
     "ape",
     "associate",
     "autocorrelation",
+    "blame",
     "block_bootstrap",
     "chi2_band",
+    "diagnose",
     "gap_labels",
     "interpolate",
     "nees",

@@ -148,7 +148,7 @@ def _wide_readings(table: CsvTable, t: int, values: list[int], context: list[int
         elif any(given):
             empty = table.header[(values + context)[given.index(False)]]
             raise FileFormatError(
-                f"{table.where(line)}: the cell of column {empty!r} is empty and others of its stream are not; "
+                f"{table.where(line)}: the cell of column {empty!r} is empty, others of its stream are not; "
                 "a reading has all of its numbers, or none"
             )
     return readings
