@@ -39,6 +39,7 @@ from sequential.models import (
 )
 from sequential.noise import ImuNoise, diagonal
 from sequential.run import Estimator, run
+from sequential.simulate import Simulation, simulate
 from sequential.smoothers import IteratedSmoother, RauchTungStriebel
 from sequential.timeline import Problem, prepare
 from sequential.tuning import Knob, Tuning, tune
@@ -76,6 +77,7 @@ __all__ = [
     "Run",
     "Sensor",
     "SensorLog",
+    "Simulation",
     "StateSpace",
     "Strapdown",
     "Stream",
@@ -87,5 +89,6 @@ __all__ = [
     "inertial_state",
     "prepare",
     "run",
+    "simulate",
     "tune",
 ]
