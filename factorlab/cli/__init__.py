@@ -1,6 +1,6 @@
 """The command line: one file a command, heavy libraries imported when a command runs.
 
-Exit codes: 0 ok, 1 the data are at fault, 2 the command line is, 3 (only with --check) a consistency check failed.
+Exit codes: 0 ok, 1 the data are at fault, 2 the command line is, 3 (only with --check) a check failed.
 """
 
 import click
@@ -13,8 +13,24 @@ from factorlab.cli.info import info
 __all__ = ["main"]
 
 
+def show_version(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    """Print the version and stop."""
+    if wanted:
+        from factorlab.versions import version_of
+
+        click.echo(f"factorlab {version_of('factorlab', 'source tree')}")
+        context.exit()
+
+
 @click.group(name="factorlab", context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="factorlab")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=show_version,
+    help="Print it.",
+)
 def main() -> None:
     """From a raw sensor log to a tuned, consistency-checked estimate.
 

@@ -49,19 +49,35 @@ class Settings:
     metavar="K",
     help="Use one reading in K, score on the others.  [default: 5 for a dataset, 1 for a log]",
 )
-@click.option("--tune", is_flag=True, help="Fit the noise first, on the readings in use only; show both tables.")
-@click.option("--model", metavar="FILE.py:NAME", help="For a log of your own: a StateSpace, or a function that returns one.")
-@click.option("--truth", type=click.Path(path_type=Path), metavar="TUM_FILE", help="For a log of your own: where it really was.")
+@click.option("--tune", is_flag=True, help="Fit the noise first, on the readings in use only.")
+@click.option(
+    "--model",
+    metavar="FILE.py:NAME",
+    help="For a log of your own: a StateSpace, or a function that returns one.",
+)
+@click.option(
+    "--truth",
+    type=click.Path(path_type=Path),
+    metavar="TUM_FILE",
+    help="For a log of your own: where it really was.",
+)
 @click.option("--robot", type=int, metavar="N", help="Only this robot, where a dataset has several.")
-@click.option("--max-gap", type=click.FloatRange(min=0, min_open=True), metavar="S", help="Longest pause of the input to bridge, s.")
+@click.option(
+    "--max-gap",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Longest pause of the input to bridge, s.",
+)
 @as_json
-@click.option("-o", "--out", type=FOLDER, metavar="DIR", help="Write report.html, report.json and trajectories here.")
+@click.option(
+    "-o", "--out", type=FOLDER, metavar="DIR", help="Write report.html, report.json and trajectories here."
+)
 @click.option("--force", is_flag=True, help="Write over an earlier report in DIR.")
 @seed_option
 @click.option("--check", is_flag=True, help="Exit with 3 when a finding is FAIL.")
 @config_option
 @in_one_sentence
-def compare(**options: Any) -> int:  # noqa: ANN401 - one keyword an option
+def compare(**options: Any) -> int:
     """Run several estimators on one log and put them in one table.
 
     DATASET is kitti, plaza1, plaza2 or mrclam; LOG is a CSV or NPZ file with named streams, together
@@ -123,20 +139,24 @@ def _datasets(settings: Settings) -> list[Dataset]:
     if settings.source in NAMES:
         for option, given in (("--model", settings.model), ("--truth", settings.truth)):
             if given is not None:
-                raise click.UsageError(f"{option} goes with a log of your own; {settings.source} brings its own")
+                raise click.UsageError(
+                    f"{option} goes with a log of your own; {settings.source} brings its own"
+                )
         use_every = 5 if settings.use_every is None else settings.use_every
         return load(settings.source, use_every=use_every, robot=settings.robot)
     from factorlab.compare.own import own_dataset, require_log
 
     path = require_log(settings.source, NAMES)
     if settings.robot is not None:
-        raise click.UsageError("--robot goes with a dataset that has several, not with a log of your own")
+        raise click.UsageError("--robot goes with a dataset that has several")
     if settings.model is None:
-        raise click.UsageError(f"a log of your own needs a model: factorlab compare {path} --model FILE.py:NAME")
+        raise click.UsageError(
+            f"a log of your own needs a model: factorlab compare {path} --model FILE.py:NAME"
+        )
     return [own_dataset(path, settings.model, settings.truth, settings.use_every or 1)]
 
 
-def _progress(name: str) -> Any:  # noqa: ANN401 - a context manager that gives a Progress
+def _progress(name: str) -> Any:
     from factorlab.cli.progress import bar
 
     return bar(name, shown=sys.stderr.isatty())

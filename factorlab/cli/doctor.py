@@ -1,4 +1,4 @@
-"""`factorlab doctor`: is everything here that a run needs?"""
+"""`factorlab doctor`: whether everything is here that a run needs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ __all__ = ["doctor"]
 @click.command(short_help="Versions, data and browser found on this machine.")
 @as_json
 @in_one_sentence
-def doctor(as_json: bool) -> int:  # noqa: FBT001 - click passes flags by name
-    """Say what is installed, where the recordings are, and what is missing; exits with 1 if anything needed is."""
+def doctor(as_json: bool) -> int:
+    """Say what is installed, where the recordings are, and what is missing (exit code 1)."""
     from factorlab.versions import versions
 
     found = versions()
@@ -43,7 +43,7 @@ def _places() -> dict[str, str]:
     except DataError as error:
         wheel = str(error)
     data = os.environ.get("FACTORLAB_DATA")
-    folder = "not set: mrclam is not available" if not data else data
+    folder = data or "not set: mrclam is not available"
     if data and not Path(data).is_dir():
         folder = f"{data} is not a folder"
     return {"kitti, plaza": wheel, "FACTORLAB_DATA": folder}

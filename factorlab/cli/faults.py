@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import ParamSpec
+from typing import Any
 
 import click
 
@@ -12,18 +12,14 @@ __all__ = ["CHECK_FAILED", "DATA_ERROR", "INTERRUPTED", "in_one_sentence"]
 
 DATA_ERROR, CHECK_FAILED, INTERRUPTED = 1, 3, 130
 
-Arguments = ParamSpec("Arguments")
 
-
-def in_one_sentence(command: Callable[Arguments, int]) -> Callable[..., None]:
+def in_one_sentence(command: Callable[..., int]) -> Callable[..., None]:
     """Turn a function that returns an exit code into the body of a command, and give it --debug."""
 
     @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
     @functools.wraps(command)
-    def body(*args: Arguments.args, debug: bool = False, **kwargs: Arguments.kwargs) -> None:
-        if debug:
-            raise SystemExit(command(*args, **kwargs))
-        raise SystemExit(_code(lambda: command(*args, **kwargs)))
+    def body(*, debug: bool, **options: Any) -> None:
+        raise SystemExit(command(**options) if debug else _code(lambda: command(**options)))
 
     return body
 

@@ -13,7 +13,9 @@ __all__ = ["Command", "as_json", "config_option", "print_json", "seed_option"]
 
 Command = Callable[..., Any]
 
-as_json = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout, all else on stderr.")
+as_json = click.option(
+    "--json", "as_json", is_flag=True, help="One JSON document on stdout, all else on stderr."
+)
 seed_option = click.option("--seed", type=int, default=0, show_default=True, help="Seed of resampled bands.")
 
 

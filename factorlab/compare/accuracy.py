@@ -13,11 +13,11 @@ from sequential.evaluate import gap_labels, normalised_error
 from sequential.history import Run
 from sequential.jacobians import difference
 from sequential.log import Stream
-from sequential.manifold import SE2, SE3, NavState, Product
+from sequential.manifold import SE2, SE3, NavState, Product, Vector
 from sequential.model import StateSpace, evaluate
 from sequential.models import ConstantVelocity, Position
 
-__all__ = ["Errors", "errors_of", "has_position", "scored_sensor"]
+__all__ = ["Errors", "errors_of", "has_position", "position_axes", "scored_sensor"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -70,13 +70,26 @@ def scored_sensor(model: StateSpace) -> str:
 
 def has_position(dataset: Dataset) -> bool:
     """Whether the state says where something is, so that a map can be drawn."""
-    model, manifold = dataset.model, dataset.model.manifold
-    parts = manifold.parts.values() if isinstance(manifold, Product) else (manifold,)
-    if any(isinstance(part, SE2 | SE3 | NavState) for part in parts) or dataset.truth is not None:
-        return True
+    return position_axes(dataset.model, dataset.truth) is not None
+
+
+def position_axes(model: StateSpace, truth: Truth | None = None) -> int | None:
+    """2 or 3, where the state has a pose, or a vector that a truth or a position sensor says is a place."""
+    manifold = model.manifold
+    parts = tuple(manifold.parts.values()) if isinstance(manifold, Product) else (manifold,)
+    if any(isinstance(part, SE3 | NavState) for part in parts):
+        return 3
+    if any(isinstance(part, SE2) for part in parts):
+        return 2
     if isinstance(model.process, ConstantVelocity):
-        return model.process.axes >= 2
-    return any(isinstance(sensor, Position) for sensor in model.sensors.values())
+        return model.process.axes if model.process.axes in {2, 3} else None
+    seen = [sensor.axes for sensor in model.sensors.values() if isinstance(sensor, Position)]
+    if seen:
+        return seen[0]
+    largest = max((part.size for part in parts if isinstance(part, Vector)), default=0)
+    if truth is None or largest < 2:
+        return None
+    return 2 if largest < 3 or not truth.position[:, 2:].any() else 3
 
 
 def _against_held_out(model: StateSpace, name: str, held: Stream, used: Ints, run: Run) -> Errors:
@@ -92,7 +105,12 @@ def _against_held_out(model: StateSpace, name: str, held: Stream, used: Ints, ru
         residual.append(r)
         cov.append(H @ run.cov[node] @ H.T + sensor.noise_cov)
     return Errors(
-        held.t, np.array(residual), np.array(cov), gap_labels(held.t, used), "held-out", isinstance(sensor, Position)
+        held.t,
+        np.array(residual),
+        np.array(cov),
+        gap_labels(held.t, used),
+        "held-out",
+        isinstance(sensor, Position),
     )
 
 

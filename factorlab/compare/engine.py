@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from statistics import median
 
 import numpy as np
-from factorlab.compare.fitting import fit
-from factorlab.compare.verdict import findings_of
 from numpy.typing import NDArray
 
 from factorlab.compare.accuracy import errors_of
-from factorlab.compare.estimators import KINDS, make, require_names
+from factorlab.compare.estimators import KINDS, require_names
+from factorlab.compare.fitting import fit
 from factorlab.compare.honesty import nis_of, normalised_error_of
 from factorlab.compare.table import Comparison, Row
+from factorlab.compare.timing import solve
+from factorlab.compare.verdict import findings_of
 from factorlab.datasets import Dataset
 from sequential.errors import FactorlabError
 from sequential.history import Run
 from sequential.model import StateSpace
-from sequential.run import Estimator
 from sequential.timeline import Problem, prepare
 
 __all__ = ["Progress", "compare"]
 
 Progress = Callable[[str, int, int], None]
-REPEATS = 3
-QUICK_S = 1.0  # a solve that takes longer is timed once
 
 
 def silent(what: str, done: int, total: int) -> None:
@@ -58,30 +54,33 @@ def compare(
         where the log or the model is at fault; a solver that fails becomes a row with its message.
     """
     names = require_names(tuple(estimators or dataset.default_estimators))
-    total = len(names) * (2 if tune else 1) + tune
-    done = 0
-
-    def table(model: StateSpace, when: str) -> tuple[Row, ...]:
-        nonlocal done
-        problem = prepare(model, dataset.log, at=_scored_times(dataset, model), max_gap=max_gap)
-        rows = []
-        for name in names:
-            progress(f"{KINDS[name].title}{when}", done, total)
-            rows.append(_row(name, dataset, problem, seed))
-            done += 1
-        return tuple(rows)
-
+    step = _Steps(progress, len(names) * (2 if tune else 1) + tune + 1)
     untuned: tuple[Row, ...] = ()
     tuned, model = None, dataset.model
     if tune:
-        untuned = table(model, ", as shipped")
-        progress("tuning the noise", done, total)
+        untuned = _rows(names, dataset, _problem(dataset, model, max_gap), seed, step, ", as shipped")
+        step("tuning the noise")
         tuned, model = fit(dataset)
-        done += 1
-    rows = table(model, ", tuned" if tune else "")
-    progress("done", total, total)
-    findings = findings_of(dataset, model, rows)
+    problem = _problem(dataset, model, max_gap)
+    rows = _rows(names, dataset, problem, seed, step, ", tuned" if tune else "")
+    step("diagnosis")
+    findings = findings_of(problem, rows)
     return Comparison(dataset, model, rows, findings, _readings(dataset), seed, untuned, tuned)
+
+
+class _Steps:
+    """Counts steps for a progress bar: each call begins the next one."""
+
+    def __init__(self, progress: Progress, total: int) -> None:
+        self.progress, self.total, self.begun = progress, total, 0
+
+    def __call__(self, what: str) -> None:
+        self.progress(what, self.begun, self.total)
+        self.begun += 1
+
+
+def _problem(dataset: Dataset, model: StateSpace, max_gap: float | None) -> Problem:
+    return prepare(model, dataset.log, at=_scored_times(dataset, model), max_gap=max_gap)
 
 
 def _scored_times(dataset: Dataset, model: StateSpace) -> NDArray[np.int64] | None:
@@ -99,11 +98,25 @@ def _readings(dataset: Dataset) -> int:
     return sum(len(dataset.log[name]) for name in streams)
 
 
-def _row(name: str, dataset: Dataset, problem: Problem, seed: int) -> Row:
-    try:
-        run, seconds = _timed(make(name), problem, repeat_slow=not KINDS[name].graph)
-    except FactorlabError as error:
-        return Row(name, message=" ".join(str(error).split()))
+def _rows(
+    names: tuple[str, ...], dataset: Dataset, problem: Problem, seed: int, step: _Steps, when: str
+) -> tuple[Row, ...]:
+    rows: dict[str, Row] = {}
+    for name in names:
+        step(f"{KINDS[name].title}{when}")
+        if name in rows:
+            continue  # the other half of a pass over iSAM2
+        try:
+            solved = solve(name, problem, names)
+        except FactorlabError as error:
+            rows[name] = Row(name, message=" ".join(str(error).split()))
+            continue
+        for found, (run, seconds) in solved.items():
+            rows[found] = _row(found, dataset, problem, seed, run, seconds)
+    return tuple(rows[name] for name in names)
+
+
+def _row(name: str, dataset: Dataset, problem: Problem, seed: int, run: Run, seconds: float) -> Row:
     errors = errors_of(dataset, problem.model, run)
     honesty = None if errors is None else normalised_error_of(errors, np.random.default_rng(seed))
     return Row(
@@ -118,20 +131,3 @@ def _row(name: str, dataset: Dataset, problem: Problem, seed: int) -> Row:
         run.report.message,
         run,
     )
-
-
-def _timed(estimator: Estimator, problem: Problem, *, repeat_slow: bool) -> tuple[Run, float]:
-    """A run, and the median wall time of warm ones: the first may have compiled its kernels."""
-    run, first = _solve(estimator, problem)
-    if first > QUICK_S and not repeat_slow:
-        return run, first  # nothing of a graph is compiled here, and once is long enough
-    times: list[float] = []
-    while len(times) < REPEATS and (not times or times[-1] < QUICK_S):
-        times.append(_solve(estimator, problem)[1])
-    return run, median(times)
-
-
-def _solve(estimator: Estimator, problem: Problem) -> tuple[Run, float]:
-    began = time.perf_counter()
-    run = estimator.solve(problem)
-    return run, time.perf_counter() - began

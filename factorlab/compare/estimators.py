@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from difflib import get_close_matches
 from typing import NamedTuple
 
@@ -22,21 +23,21 @@ class Kind(NamedTuple):
     """What a row of the table says about its estimator."""
 
     title: str
-    online: bool  # an estimate at t uses readings up to t only
-    graph: bool
+    online: bool = False  # an estimate at t uses readings up to t only
+    graph: bool = False
 
 
 KINDS = {
-    "ekf": Kind("EKF", True, False),
-    "iekf": Kind("iterated EKF", True, False),
-    "ukf": Kind("UKF", True, False),
-    "ekf_rts": Kind("EKF + RTS", False, False),
-    "ieks": Kind("iterated smoother", False, False),
-    "fixed_lag": Kind("fixed lag 5.5 s", True, True),
-    "isam2": Kind("iSAM2, online", True, True),
-    "isam2_final": Kind("iSAM2, at the end", False, True),
-    "batch": Kind("batch graph", False, True),
-    "kf": Kind("Kalman filter", True, False),
+    "ekf": Kind("EKF", online=True),
+    "iekf": Kind("iterated EKF", online=True),
+    "ukf": Kind("UKF", online=True),
+    "ekf_rts": Kind("EKF + RTS"),
+    "ieks": Kind("iterated smoother"),
+    "fixed_lag": Kind("fixed lag 5.5 s", online=True, graph=True),
+    "isam2": Kind("iSAM2, online", online=True, graph=True),
+    "isam2_final": Kind("iSAM2, at the end", graph=True),
+    "batch": Kind("batch graph", graph=True),
+    "kf": Kind("Kalman filter", online=True),
 }
 NAMES = tuple(name for name in KINDS if name != "kf")
 EVERY_NAME = tuple(KINDS)
@@ -61,7 +62,7 @@ def require_names(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def make(name: str) -> Estimator:
-    """The estimator of a name, with the settings that a comparison uses; gtsam is imported for graphs only."""
+    """The estimator of a name, as a comparison uses it; gtsam is imported for graphs only."""
     if KINDS[name].graph:
         from factorlab.graph import BatchGraph, FixedLagGraph, IncrementalGraph
 
@@ -72,10 +73,11 @@ def make(name: str) -> Estimator:
         from sequential import UnscentedKalmanFilter
 
         return UnscentedKalmanFilter()
-    return {
+    recursive: dict[str, Callable[[], Estimator]] = {
         "kf": KalmanFilter,
         "ekf": ExtendedKalmanFilter,
         "iekf": IteratedExtendedKalmanFilter,
         "ekf_rts": RauchTungStriebel,
         "ieks": IteratedSmoother,
-    }[name]()
+    }
+    return recursive[name]()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from math import isfinite
 
 from factorlab.compare.table import Tuned
 from factorlab.datasets import Dataset
@@ -20,16 +20,16 @@ def fit(dataset: Dataset) -> tuple[Tuned, StateSpace]:
     ModelError
         where the dataset has nothing that may be tuned.
     """
-    from sequential.tuning import tune
+    from sequential.tuning import tune  # with it comes scipy.optimize
 
     if not dataset.knobs:
         msg = f"there is nothing to tune in {dataset.name!r}: its model has no noise that can be scaled"
         raise ModelError(msg)
-    found: Any = tune(dataset.build, dataset.knobs, dataset.log)
+    found = tune(dataset.build, dataset.knobs, dataset.log)
     tuned = Tuned(
         initial=dict(found.initial),
         values=dict(found.values),
-        intervals={name: (float(a), float(b)) for name, (a, b) in getattr(found, "intervals", {}).items()},
+        intervals={name: found.interval(name) for name in found.decades if isfinite(found.decades[name])},
         units={knob.name: knob.unit for knob in dataset.knobs},
         seconds=found.seconds,
         log_likelihood_before=found.log_likelihood_before,

@@ -1,4 +1,4 @@
-"""Whether an estimate's covariance can be believed: normalised errors and innovations beside what χ² expects."""
+"""Whether a covariance can be believed: normalised errors and innovations beside what χ² expects."""
 
 from __future__ import annotations
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
-from factorlab.compare.verdict import Finding
-
 from factorlab.compare.accuracy import Errors
 from factorlab.compare.estimators import KINDS
 from factorlab.compare.honesty import Nis, NormalisedError
+from factorlab.compare.verdict import Finding
 from factorlab.datasets import Dataset
 from factorlab.versions import versions
 from sequential.history import Run
@@ -135,11 +134,13 @@ class Comparison:
 
 def document(comparisons: tuple[Comparison, ...], command: str) -> dict[str, Any]:
     """One JSON document for one comparison, or `{"runs": {name: …}}` for several; NaN becomes null."""
-    foot = {"versions": versions(), "command": command}
+    whole: dict[str, Any] = {"schema": SCHEMA}
     if len(comparisons) == 1:
-        return strict({"schema": SCHEMA} | comparisons[0].to_json() | foot)
-    runs = {comparison.name: comparison.to_json() for comparison in comparisons}
-    return strict({"schema": SCHEMA, "runs": runs} | foot)
+        whole |= comparisons[0].to_json()
+    else:
+        whole["runs"] = {comparison.name: comparison.to_json() for comparison in comparisons}
+    whole |= {"versions": versions(), "command": command}
+    return {key: strict(value) for key, value in whole.items()}
 
 
 def strict(value: Any) -> Any:

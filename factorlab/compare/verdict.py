@@ -1,4 +1,4 @@
-"""The verdict: a few findings that say what can be believed and what to change."""
+"""The verdict: a few findings, worst first, that say what can be believed and what to change."""
 
 from __future__ import annotations
 
@@ -6,19 +6,24 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from factorlab.compare.estimators import KINDS
+from sequential.errors import FactorlabError
+from sequential.evaluate import Blame, blame, diagnose
+from sequential.timeline import Problem
 
 if TYPE_CHECKING:
-    from factorlab.compare.honesty import Nis, NormalisedError
+    from factorlab.compare.honesty import NormalisedError
     from factorlab.compare.table import Row
-    from factorlab.datasets import Dataset
-    from sequential.model import StateSpace
 
 __all__ = ["Finding", "Status", "findings_of"]
 
 Status = Literal["PASS", "WARN", "FAIL"]
 Band = tuple[float, float]
+ORDER = {"FAIL": 0, "WARN": 1, "PASS": 2}
 
-TOLERABLE = 2.0  # a mean within this factor of what is expected is a warning, beyond it a failure
+OVERCONFIDENT = 1.25  # errors so many times larger than stated are a failure
+PESSIMISTIC = 2.0  # so many times smaller, too; in between is a warning, since it wastes but does not mislead
+BLAME_RUNS = 100  # about how often the log is filtered to find the guilty noise
+BLAME_S = 10.0  # and how long that may take
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,29 +37,34 @@ class Finding:
     meaning: str
     action: str
     estimator: str = ""
+    sensor: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values under the names of the fields."""
         return {name: getattr(self, name) for name in self.__slots__}
 
 
-def findings_of(dataset: Dataset, model: StateSpace, rows: tuple[Row, ...]) -> tuple[Finding, ...]:
-    """Findings on a table of rows: solves, innovations of a filter, honesty of the first filter and last smoother."""
+def findings_of(problem: Problem, rows: tuple[Row, ...]) -> tuple[Finding, ...]:
+    """What a table of rows reveals.
+
+    Failed solves, the innovations of the first filter with the noise they accuse, and whether that filter and
+    the last smoother know how wrong they are.
+    """
     solved = [row for row in rows if not row.failed]
-    found = [_failed(row) for row in rows if row.failed]
-    found += [_unsettled(row) for row in solved if not row.converged]
     filters = [row for row in solved if KINDS[row.name].online]
     smoothers = [row for row in solved if not KINDS[row.name].online]
-    if filters and filters[0].nis is not None:
-        found += _innovations(filters[0], filters[0].nis)
-    for row in (*filters[:1], *smoothers[-1:]):
-        if row.normalised_error is not None:
-            found.append(_honesty(row, row.normalised_error))
-    return tuple(found)
+    found = [_failed(row) for row in rows if row.failed]
+    found += [_unsettled(row) for row in solved if not row.converged]
+    for row in (filters or smoothers)[:1]:
+        found += _diagnosis(problem, row)
+    found += [_honesty(row) for row in (*filters[:1], *smoothers[-1:]) if row.normalised_error is not None]
+    return tuple(sorted(found, key=lambda finding: ORDER[finding.status]))
 
 
 def _failed(row: Row) -> Finding:
-    return Finding(f"{row.title}: solve", None, None, "FAIL", row.message, "leave it out, or mend the cause", row.name)
+    return Finding(
+        f"{row.title}: solve", None, None, "FAIL", row.message, "leave it out, or mend the cause", row.name
+    )
 
 
 def _unsettled(row: Row) -> Finding:
@@ -62,48 +72,47 @@ def _unsettled(row: Row) -> Finding:
     return Finding(f"{row.title}: solve", None, None, "WARN", meaning, "do not quote its figures", row.name)
 
 
-def _innovations(row: Row, nis: Nis) -> list[Finding]:
-    sensors = nis.sensors or {"": nis}
-    return [_nis_of_sensor(row, name, one) for name, one in sensors.items()]
+def _diagnosis(problem: Problem, row: Row) -> list[Finding]:
+    """What the innovations say, in the words of `sequential.evaluate.diagnose`."""
+    assert row.run is not None  # noqa: S101 - only solved rows are diagnosed
+    found = []
+    for one in diagnose(row.run, problem.model, _guilty(problem, row)):
+        if one.metric == "solve":
+            continue  # told already
+        of = f" of {one.sensor}" if one.sensor and one.sensor not in one.metric else ""
+        metric = f"{row.title}: {one.metric}{of}"
+        found.append(
+            Finding(metric, one.value, one.band, one.level, one.meaning, one.advice, row.name, one.sensor)
+        )
+    return found
 
 
-def _nis_of_sensor(row: Row, sensor: str, nis: Nis) -> Finding:
-    ratio = nis.mean / nis.expected
-    status: Status = "PASS" if nis.inside else "WARN" if 1 / TOLERABLE <= ratio <= TOLERABLE else "FAIL"
-    what = f"NIS of {sensor}" if sensor else "NIS"
-    meaning = _meaning(ratio, "innovations", inside=nis.inside)
-    return Finding(f"{row.title}: {what}", nis.mean, nis.band95, status, meaning, _action(ratio, status), row.name)
+def _guilty(problem: Problem, row: Row) -> Blame | None:
+    """Which noise is off, where finding that out does not take too long."""
+    if row.seconds is None or row.seconds * BLAME_RUNS > BLAME_S:
+        return None
+    try:
+        return blame(problem)
+    except FactorlabError:
+        return None
 
 
-def _honesty(row: Row, honest: NormalisedError) -> Finding:
-    ratio = honest.mean / honest.expected
+def _honesty(row: Row) -> Finding:
+    honest: NormalisedError = row.normalised_error  # type: ignore[assignment]  # the caller has looked
+    factor = (honest.mean / honest.expected) ** 0.5
     low, high = honest.bootstrap_band95 or honest.band95
     fits = honest.inside or low <= honest.expected <= high
-    status: Status = "PASS" if fits else "WARN" if 1 / TOLERABLE <= ratio <= TOLERABLE else "FAIL"
+    status: Status = "FAIL" if factor > OVERCONFIDENT or factor < 1 / PESSIMISTIC else "WARN"
+    status = "PASS" if fits else status
     against = "held-out readings" if honest.against == "held-out" else "the truth"
-    meaning = _meaning(ratio, f"errors against {against}", inside=fits)
-    return Finding(
-        f"{row.title}: normalised error",
-        honest.mean,
-        honest.band95,
-        status,
-        meaning,
-        _action(ratio, status),
-        row.name,
-    )
-
-
-def _meaning(ratio: float, what: str, *, inside: bool) -> str:
-    if inside:
-        return f"{what} are as large as the covariance says"
-    if ratio > 1:
-        return f"{what} are {ratio**0.5:.2g}x larger than the covariance says: overconfident"
-    return f"{what} are {ratio**-0.5:.2g}x smaller than the covariance says: pessimistic"
-
-
-def _action(ratio: float, status: Status) -> str:
-    if status == "PASS":
-        return "nothing"
-    if ratio > 1:
-        return "raise the process or sensor noise, or fit it with --tune"
-    return "lower the process or sensor noise, or fit it with --tune"
+    what = f"{honest.mean:.3g} where {honest.expected:g} is expected, median {honest.median:.2g}"
+    if fits:
+        meaning, action = f"errors against {against} are as large as stated ({what})", ""
+    elif factor > 1:
+        meaning = f"errors against {against} are {factor:.2g}x larger than stated ({what}): overconfident"
+        action = "do not trust the covariance; see what the innovations accuse"
+    else:
+        meaning = f"errors against {against} are {1 / factor:.2g}x smaller than stated ({what}): pessimistic"
+        action = "the covariance is on the safe side; lower the noise if it matters"
+    metric = f"{row.title}: normalised error"
+    return Finding(metric, honest.mean, honest.band95, status, meaning, action, row.name)

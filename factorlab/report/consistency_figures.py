@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from factorlab.compare import Comparison, Row
 from factorlab.report.pair import filter_of, smoother_of
-from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, title_of
+from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, widths
 from sequential.errors import ShapeError
 from sequential.evaluate import whiteness
 from sequential.evaluate.consistency import chi2_quantile
@@ -19,6 +20,7 @@ __all__ = ["autocorrelations", "innovations_over_time", "quantiles"]
 
 DENSE = 3000  # more dots than this become a picture inside the figure
 SMALLEST = 1e-3
+SURE = 0.001  # as in the verdict: several axes are tested at once
 
 
 def innovations_over_time(comparison: Comparison) -> Figure | None:
@@ -41,7 +43,11 @@ def innovations_over_time(comparison: Comparison) -> Figure | None:
 def _dots(axes: Axes, row: Row, sensor: str) -> None:
     assert row.run is not None  # noqa: S101 - the caller has looked
     taken = row.run.innovations[sensor]
-    t, nis, m = seconds(taken.t, int(row.run.t[0])), np.maximum(taken.nis(), SMALLEST), taken.residual.shape[1]
+    t, nis, m = (
+        seconds(taken.t, int(row.run.t[0])),
+        np.maximum(taken.nis(), SMALLEST),
+        taken.residual.shape[1],
+    )
     low, high = chi2_quantile(0.025, m), chi2_quantile(0.975, m)
     axes.axhspan(low, high, color="#009E73", alpha=0.18, linewidth=0, label=f"95 % of χ² with {m} d.o.f.")
     axes.axhline(m, color="#009E73", linewidth=1.0, label="expected mean")
@@ -49,16 +55,20 @@ def _dots(axes: Axes, row: Row, sensor: str) -> None:
     dense = len(t) > DENSE
     axes.plot(t, nis, ".", color=color, markersize=2 if dense else 4, rasterized=dense)
     if not taken.accepted.all():
-        axes.plot(t[~taken.accepted], nis[~taken.accepted], "x", color="#888888", markersize=4, label="rejected")
+        axes.plot(
+            t[~taken.accepted], nis[~taken.accepted], "x", color="#888888", markersize=4, label="rejected"
+        )
     inside = 100 * float(np.mean((nis >= low) & (nis <= high)))
     log_axis(axes)
     axes.set_ylabel(f"NIS of {sensor}")
     kind = "" if taken.kind == "filter" else f", {taken.kind}"
-    axes.set_title(f"{row.title}{kind}: mean {nis.mean():.3g}, {inside:.0f} % inside (95 % expected)")
+    axes.set_title(
+        f"{row.title}, {sensor}{kind}: mean {nis.mean():.3g}, {inside:.0f} % inside (95 % expected)"
+    )
 
 
 def autocorrelations(comparison: Comparison) -> Figure | None:
-    """Does one innovation of the filter predict the next?"""
+    """Autocorrelation of the filter's innovations: whether one predicts the next."""
     row = filter_of(comparison.rows)
     if row is None or row.run is None:
         return None
@@ -75,7 +85,7 @@ def autocorrelations(comparison: Comparison) -> Figure | None:
 
 def _correlation(axes: Axes, row: Row, name: str, taken: Innovations) -> None:
     try:
-        found = whiteness(taken)
+        found = whiteness(taken, level=SURE)
     except ShapeError:
         return
     lags, m = found.correlation.shape
@@ -84,10 +94,19 @@ def _correlation(axes: Axes, row: Row, name: str, taken: Innovations) -> None:
     for k in range(m):
         shift = 0.16 * (k - (m - 1) / 2)
         color = ("#D55E00", "#0072B2", "#000000", "#CC79A7")[k % 4]
-        axes.vlines(np.arange(1, lags + 1) + shift, 0.0, found.correlation[:, k], color=color, linewidth=2.2,
-                    label=f"component {k + 1}")
+        axes.vlines(
+            np.arange(1, lags + 1) + shift,
+            0.0,
+            found.correlation[:, k],
+            color=color,
+            linewidth=2.2,
+            label=f"component {k + 1}",
+        )
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("lag, readings")
-    axes.set_title(f"{row.title}, {name}: {100 * found.share_outside:.0f} % outside (5 % expected), {found.verdict}")
+    axes.set_title(
+        f"{row.title}, {name}: {100 * found.share_outside:.0f} % outside (5 % expected), {found.verdict}"
+    )
 
 
 def quantiles(comparison: Comparison) -> Figure | None:
@@ -97,18 +116,26 @@ def quantiles(comparison: Comparison) -> Figure | None:
         return None
     figure, axes = blank(4.4, 1, 2)
     m = rows[0].errors.error.shape[1]  # type: ignore[union-attr]
-    for row in rows:
+    for row, width in zip(rows, widths(len(rows)), strict=True):
         values = np.sort(row.errors.normalised())  # type: ignore[union-attr]
         p = (np.arange(len(values)) + 0.5) / len(values)
         kept = thin(len(values), 300)
         expected = np.array([chi2_quantile(x, m) for x in p[kept]])
-        axes[0, 0].plot(expected, np.maximum(values[kept], SMALLEST), label=title_of(row.name), **line_of(row.name))
+        axes[0, 0].plot(
+            expected,
+            np.maximum(values[kept], SMALLEST),
+            linewidth=width,
+            label=row.title,
+            **line_of(row.name),
+        )
     limits = [chi2_quantile(0.005, m), chi2_quantile(0.999, m)]
     axes[0, 0].plot(limits, limits, color="#009E73", linewidth=2.5, alpha=0.5, label="consistent")
     log_axis(axes[0, 0], "xy")
     axes[0, 0].set(xlabel=f"quantile of χ² with {m} d.o.f.", ylabel="normalised error")
     axes[0, 0].set_title("above the diagonal: larger errors than stated")
-    _histogram(axes[0, 1], [r for r in (filter_of(comparison.rows), smoother_of(comparison.rows)) if r in rows], m)
+    _histogram(
+        axes[0, 1], [r for r in (filter_of(comparison.rows), smoother_of(comparison.rows)) if r in rows], m
+    )
     legend_below(figure, axes[0, 0])
     return figure
 

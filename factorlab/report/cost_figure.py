@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from factorlab.compare import Comparison, Row
@@ -21,19 +23,28 @@ def cost(comparison: Comparison) -> Figure | None:
     for row in rows:
         if row.name in before:
             _mark(one, before[row.name], hollow=True)
-            earlier = before[row.name]
-            one.plot([earlier.us_per_measurement, row.us_per_measurement], [earlier.rmse, row.rmse],
-                     color=LINES[row.name]["color"], linewidth=0.5, alpha=0.6)
+            ends = (before[row.name], row)
+            x, y = ([getattr(end, name) or np.nan for end in ends] for name in ("us_per_measurement", "rmse"))
+            one.plot(x, y, color=LINES[row.name]["color"], linewidth=0.5, alpha=0.6)
         _mark(one, row, hollow=False)
     log_axis(one, "xy")
     unit = "m" if rows[0].errors is not None and rows[0].errors.metres else "sensor's unit"
     one.set(xlabel="time for each reading, µs", ylabel=f"RMSE, {unit}")
-    one.set_title("hollow: noise as shipped, full: tuned" if before else "lower is more accurate, left is faster")
+    one.set_title(
+        "hollow: noise as shipped, full: tuned" if before else "lower is more accurate, left is faster"
+    )
     legend_below(figure, one)
     return figure
 
 
-def _mark(axes, row: Row, *, hollow: bool) -> None:  # noqa: ANN001
+def _mark(axes: Axes, row: Row, *, hollow: bool) -> None:
     look = LINES[row.name]
-    axes.plot([row.us_per_measurement], [row.rmse], look["marker"], color=look["color"], markersize=9,
-              markerfacecolor="none" if hollow else look["color"], label=None if hollow else row.title)
+    axes.plot(
+        [row.us_per_measurement or np.nan],
+        [row.rmse or np.nan],
+        look["marker"],
+        color=look["color"],
+        markersize=9,
+        markerfacecolor="none" if hollow else look["color"],
+        label=None if hollow else row.title,
+    )

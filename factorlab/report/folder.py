@@ -86,4 +86,6 @@ def _earlier_files(target: Path) -> list[str]:
     except (OSError, ValueError, AttributeError):
         return []
     whole = target.resolve()
-    return [name for name in names if isinstance(name, str) and (target / name).resolve().is_relative_to(whole)]
+    return [
+        name for name in names if isinstance(name, str) and (target / name).resolve().is_relative_to(whole)
+    ]

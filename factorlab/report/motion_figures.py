@@ -9,15 +9,16 @@ from numpy.typing import NDArray
 
 from factorlab.compare import Comparison, Row
 from factorlab.compare.accuracy import has_position, scored_sensor
+from factorlab.compare.text import figure
 from factorlab.report.pair import filter_of, smoother_of
-from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, title_of
+from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, title_of, widths
 from sequential.log import seconds
 from sequential.models import Position
 
 __all__ = ["envelopes", "errors_over_time", "sigmas", "trajectory"]
 
 Array = NDArray[np.float64]
-ZOOM_S = 15.0
+ZOOM_S = 9.0
 
 
 def trajectory(comparison: Comparison) -> Figure | None:
@@ -25,32 +26,37 @@ def trajectory(comparison: Comparison) -> Figure | None:
     if not has_position(comparison.dataset):
         return None
     worst = _worst(comparison)
-    figure, axes = blank(6.2, 1, 1 if worst is None else 2)
+    drawing, axes = blank(6.2, 1, 1 if worst is None else 2)
     whole = axes[0, 0]
-    _paths(whole, comparison)
+    _paths(whole, comparison, 1.5)
     whole.set_title("whole trajectory")
     if worst is not None:
         _zoom(axes[0, 1], comparison, *worst)
+    whole.set_aspect("equal", adjustable="datalim")
     for one in axes.ravel():
-        one.set_aspect("equal", adjustable="datalim")
         one.set(xlabel="x, m", ylabel="y, m")
-    legend_below(figure, whole)
-    return figure
+    legend_below(drawing, whole)
+    return drawing
 
 
-def _paths(axes: Axes, comparison: Comparison) -> None:
+def _paths(axes: Axes, comparison: Comparison, dot: float) -> None:
     dataset = comparison.dataset
     if dataset.truth is not None:
         kept = thin(len(dataset.truth))
-        axes.plot(*dataset.truth.position[kept, :2].T, color="#888888", linewidth=2.5, alpha=0.6, label="truth")
-    for row in comparison.rows:
+        axes.plot(
+            *dataset.truth.position[kept, :2].T, color="#888888", linewidth=2.5, alpha=0.6, label="truth"
+        )
+    for row, width in zip(comparison.rows, widths(len(comparison.rows)), strict=True):
         if row.run is not None:
             path = dataset.positions(row.run)
-            axes.plot(*path[thin(len(path)), :2].T, label=row.title, **line_of(row.name))
+            axes.plot(*path[thin(len(path)), :2].T, linewidth=width, label=row.title, **line_of(row.name))
     name = scored_sensor(comparison.model)
     if isinstance(comparison.model.sensors[name], Position):
         if dataset.held_out is not None:
-            axes.plot(*dataset.held_out.values[:, :2].T, ".", color="#999999", markersize=3, label="held out")
+            held = dataset.held_out.values[thin(len(dataset.held_out)), :2]
+            axes.plot(
+                *held.T, "o", color="#666666", fillstyle="none", markersize=dot, zorder=5, label="held out"
+            )
         used = dataset.log[name].values
         axes.plot(*used[thin(len(used)), :2].T, "+", color="#444444", markersize=7, label="used")
 
@@ -64,7 +70,7 @@ def _worst(comparison: Comparison) -> tuple[Row, int] | None:
 
 
 def _zoom(axes: Axes, comparison: Comparison, row: Row, t: int) -> None:
-    _paths(axes, comparison)
+    _paths(axes, comparison, 5.0)
     assert row.run is not None and row.errors is not None  # noqa: S101, PT018 - _worst has looked
     near = np.abs(row.run.t - t) <= ZOOM_S * 1e9
     path = comparison.dataset.positions(row.run)[near, :2]
@@ -72,6 +78,7 @@ def _zoom(axes: Axes, comparison: Comparison, row: Row, t: int) -> None:
     reach = 0.6 * max(float(np.ptp(path, axis=0).max()), 4 * row.errors.rmse())
     axes.set_xlim(centre[0] - reach, centre[0] + reach)
     axes.set_ylim(centre[1] - reach, centre[1] + reach)
+    axes.set_aspect("equal", adjustable="box")
     when = seconds(np.array(t), int(row.run.t[0]))
     axes.set_title(f"where {row.title} is farthest off, around t = {when:.0f} s")
 
@@ -81,20 +88,26 @@ def errors_over_time(comparison: Comparison) -> Figure | None:
     rows = [row for row in comparison.rows if row.errors is not None]
     if not rows:
         return None
-    figure, axes = blank(3.6)
+    drawing, axes = blank(3.6)
     one = axes[0, 0]
-    for row in rows:
+    for row, width in zip(rows, widths(len(rows)), strict=True):
         t, errors = _times(row), row.errors
         kept = thin(len(t))
         length = np.maximum(np.linalg.norm(errors.error, axis=1), 1e-4)  # type: ignore[union-attr]
-        one.plot(t[kept], length[kept], label=f"{title_of(row.name)}: {row.rmse:.3g}", **line_of(row.name))
+        one.plot(
+            t[kept],
+            length[kept],
+            linewidth=width,
+            label=f"{title_of(row.name)}: {figure(row.rmse)}",
+            **line_of(row.name),
+        )
     log_axis(one)
     first = rows[0].errors
     unit = "m" if first is not None and first.metres else "sensor's unit"
     one.set(xlabel="time since the start, s", ylabel=f"error, {unit}")
     one.set_title("length of the error; the legend gives the RMSE")
-    legend_below(figure, one, 5)
-    return figure
+    legend_below(drawing, one, 5)
+    return drawing
 
 
 def _times(row: Row) -> Array:
@@ -109,13 +122,13 @@ def envelopes(comparison: Comparison) -> Figure | None:
     if not rows:
         return None
     count = min(3, rows[0].errors.error.shape[1])  # type: ignore[union-attr]
-    figure, axes = blank(1.9 * count + 0.6, count, len(rows), sharex=True)
+    drawing, axes = blank(1.9 * count + 0.6, count, len(rows), sharex=True)
     for column, row in enumerate(rows):
         for k in range(count):
             _envelope(axes[k, column], row, k)
     for one in axes[-1]:
         one.set_xlabel("time since the start, s")
-    return figure
+    return drawing
 
 
 def _envelope(axes: Axes, row: Row, k: int) -> None:
@@ -127,6 +140,9 @@ def _envelope(axes: Axes, row: Row, k: int) -> None:
     color = line_of(row.name)["color"]
     axes.fill_between(t[kept], -three[kept], three[kept], color=color, alpha=0.18, linewidth=0)
     axes.plot(t[kept], e[kept], color=color, linewidth=0.9)
+    # the first seconds may be far wider than all the rest: let the rest decide
+    reach = 1.15 * max(float(np.abs(e).max()), float(np.quantile(three, 0.9)))
+    axes.set_ylim(-reach, reach)
     name = "xyz"[k] if row.errors.metres else f"component {k + 1}"
     axes.set_ylabel(f"{name}, m" if row.errors.metres else name)
     axes.set_title(f"{row.title}, {name}: {inside:.1f} % inside ±3σ (99.7 % expected)")
@@ -137,25 +153,27 @@ def sigmas(comparison: Comparison) -> Figure | None:
     before, after = filter_of(comparison.rows), smoother_of(comparison.rows)
     if before is None or after is None or not has_position(comparison.dataset):
         return None
-    figure, axes = blank(3.2, 1, 2, sharex=True)
-    widths = []
+    drawing, axes = blank(3.2, 1, 2, sharex=True)
+    assert before.run is not None  # noqa: S101 - filter_of returns a solved row
+    stated = []
+    t = seconds(before.run.t, int(before.run.t[0]))
+    kept = thin(len(t))
     for row in (before, after):
         assert row.run is not None  # noqa: S101 - filter_of and smoother_of return solved rows
         cov = comparison.dataset.position_cov(row.run)
         width = np.sqrt(np.trace(cov, axis1=1, axis2=2))
-        t = seconds(row.run.t, int(row.run.t[0]))
-        kept = thin(len(t))
         axes[0, 0].plot(t[kept], width[kept], label=row.title, **line_of(row.name))
-        widths.append(width)
+        stated.append(width)
     log_axis(axes[0, 0])
     axes[0, 0].set(ylabel="σ of the position, m", xlabel="time since the start, s")
     axes[0, 0].set_title("stated uncertainty")
     axes[0, 0].legend()
-    ratio = widths[0] / widths[1]
-    kept = thin(len(ratio))
+    ratio = stated[0] / stated[1]
     axes[0, 1].plot(t[kept], ratio[kept], color="#444444", linewidth=0.9)
     axes[0, 1].axhline(1.0, color="#999999", linewidth=0.8)
     log_axis(axes[0, 1])
     axes[0, 1].set(ylabel="ratio", xlabel="time since the start, s")
-    axes[0, 1].set_title(f"σ of {before.title} over σ of {after.title}: median {np.median(ratio):.2g}")
-    return figure
+    axes[0, 1].set_title(
+        f"σ of {before.title} over σ of {after.title}: median {figure(float(np.median(ratio)))}"
+    )
+    return drawing

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from factorlab.compare import Comparison
-from factorlab.compare.text import band, cells, figure, headings, tuning_lines
+from factorlab.compare.text import band, cells, figure, headings, headline, tuning_lines
 from factorlab.report.consistency_figures import autocorrelations, innovations_over_time, quantiles
 from factorlab.report.cost_figure import cost
 from factorlab.report.motion_figures import envelopes, errors_over_time, sigmas, trajectory
@@ -52,13 +52,13 @@ PLOTS = (
     Plot(
         "nis",
         "Innovations",
-        "Normalised innovations squared: dots above the band are surprises, many below it mean the noise is set too high.",
+        "Squared innovations in units of their covariance: above the band are surprises.",
         innovations_over_time,
     ),
     Plot(
         "autocorrelation",
         "Whiteness",
-        "Bars that leave the band say that one innovation predicts the next: something is missing from the model.",
+        "Bars outside the band: one innovation predicts the next, so the model lacks something.",
         autocorrelations,
     ),
     Plot(
@@ -76,7 +76,7 @@ PLOTS = (
     Plot(
         "cost",
         "Accuracy against time",
-        "Time of one warm solve, covariances and consistency figures included, over the number of readings.",
+        "Time of one warm solve over the number of readings, inputs included.",
         cost,
     ),
 )
@@ -110,6 +110,7 @@ def _run(comparison: Comparison, index: int) -> dict[str, Any]:
         "comparison": comparison,
         "anchor": f"run{index}",
         "headings": headings(comparison),
+        "headline": headline(comparison),
         "tables": tables,
         "tuning": tuning_lines(comparison.tuned) if comparison.tuned else (),
         "leave_one_out": any(row.nis and row.nis.kind != "filter" for row in comparison.rows),

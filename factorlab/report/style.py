@@ -1,4 +1,4 @@
-"""How figures look, and how they become inline SVG.  Figures are made directly, never through pyplot's state."""
+"""How figures look, and how they become inline SVG; pyplot and its state are not used."""
 
 from __future__ import annotations
 
@@ -18,7 +18,18 @@ from numpy.typing import NDArray
 
 from factorlab.compare import KINDS
 
-__all__ = ["LINES", "blank", "inline_svg", "legend_below", "log_axis", "styled", "thin"]
+__all__ = [
+    "LINES",
+    "blank",
+    "inline_svg",
+    "legend_below",
+    "line_of",
+    "log_axis",
+    "styled",
+    "thin",
+    "title_of",
+    "widths",
+]
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart, and dashes for printing without colour.
 LINES: dict[str, dict[str, Any]] = {
@@ -59,11 +70,12 @@ RC = {
 @contextmanager
 def styled(name: str) -> Iterator[None]:
     """Draw with this module's settings; `name` makes ids that do not change from run to run."""
-    with mpl.rc_context({**RC, "svg.hashsalt": name}):
+    settings: dict[Any, Any] = {**RC, "svg.hashsalt": name}
+    with mpl.rc_context(settings):
         yield
 
 
-def blank(height: float, rows: int = 1, columns: int = 1, **grid: Any) -> tuple[Figure, NDArray[Any]]:  # noqa: ANN401
+def blank(height: float, rows: int = 1, columns: int = 1, **grid: Any) -> tuple[Figure, NDArray[Any]]:
     """A figure of the page's width with axes (rows, columns)."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
@@ -78,6 +90,11 @@ def title_of(name: str) -> str:
 def line_of(name: str) -> dict[str, Any]:
     """Colour and dashes of an estimator, the same in every figure."""
     return {"color": LINES[name]["color"], "linestyle": LINES[name]["linestyle"]}
+
+
+def widths(count: int) -> list[float]:
+    """Line widths from thick to thin, so that lines that coincide can all be seen."""
+    return np.linspace(2.8, 1.0, count).tolist() if count > 1 else [1.2]
 
 
 def log_axis(axes: Axes, which: str = "y") -> None:

@@ -1,36 +1,29 @@
-"""Trajectories in the TUM format: seconds, position, quaternion with the scalar last; evo reads it."""
+"""Trajectories in the TUM format, which evo reads."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from factorlab.datasets import Dataset
+from sequential import readers
+from sequential.evaluate import Trajectory
 from sequential.history import Run
 from sequential.manifold import SE2, SE3, Manifold, NavState, Product
 
-__all__ = ["tum_rows", "write_tum"]
-
-Array = NDArray[np.float64]
+__all__ = ["trajectory_of", "write_tum"]
 
 
-def tum_rows(dataset: Dataset, run: Run) -> Array:
-    """(N, 7) x y z qx qy qz qw; a planar pose has z = 0, a state without a heading the identity rotation."""
+def trajectory_of(dataset: Dataset, run: Run) -> Trajectory:
+    """Poses of a run; a planar pose has z = 0, a state without a heading no rotation."""
     position = dataset.positions(run)
-    out = np.zeros((len(run), 7))
-    out[:, : position.shape[1]] = position
     storage, member = _oriented(run.manifold)
     if isinstance(member, NavState | SE3):
-        w_first = run.mean[:, storage : storage + 4]
-        out[:, 3:6], out[:, 6] = w_first[:, 1:], w_first[:, 0]
-    elif isinstance(member, SE2):
-        half = run.mean[:, storage + 2] / 2
-        out[:, 5], out[:, 6] = np.sin(half), np.cos(half)
-    else:
-        out[:, 6] = 1.0
-    return out
+        return Trajectory(run.t, position, run.mean[:, storage : storage + 4])
+    if isinstance(member, SE2):
+        return Trajectory.planar(run.t, position, run.mean[:, storage + 2])
+    return Trajectory(run.t, position)
 
 
 def _oriented(manifold: Manifold) -> tuple[int, Manifold | None]:
@@ -44,11 +37,7 @@ def _oriented(manifold: Manifold) -> tuple[int, Manifold | None]:
 
 
 def write_tum(path: Path, dataset: Dataset, run: Run) -> None:
-    """Write one trajectory; stamps keep all their nanoseconds, as text of an integer."""
-    rows = tum_rows(dataset, run)
-    with path.open("w", encoding="ascii") as file:
-        file.write("# timestamp tx ty tz qx qy qz qw\n")
-        for t, row in zip(run.t.tolist(), rows.tolist(), strict=True):
-            sign, whole = ("-" if t < 0 else ""), abs(t)
-            stamp = f"{sign}{whole // 10**9}.{whole % 10**9:09d}"
-            file.write(f"{stamp} {' '.join(f'{v:.9g}' for v in row)}\n")
+    """Write one trajectory: seconds, position, quaternion with the scalar last."""
+    trajectory = trajectory_of(dataset, run)
+    finite = np.isfinite(trajectory.position).all(axis=1)
+    readers.write_tum(path, trajectory.select(np.flatnonzero(finite)))

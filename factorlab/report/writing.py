@@ -31,7 +31,9 @@ def write_report(
         for comparison in comparisons:
             _trajectories(comparison, folder / "trajectories", several=len(comparisons) > 1)
         files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-        text = json.dumps(document | {"files": [*files, MANIFEST]}, indent=1, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(
+            document | {"files": [*files, MANIFEST]}, indent=1, ensure_ascii=False, allow_nan=False
+        )
         (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
     return target / "report.html"
 
