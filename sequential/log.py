@@ -9,25 +9,38 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sequential.errors import MissingStreamError, NotFiniteError, ShapeError, TimeOrderError
+from sequential.errors import DataError, MissingStreamError, NotFiniteError, ShapeError, TimeOrderError
 
 __all__ = ["SensorLog", "Stream", "nanoseconds", "seconds"]
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 NS = 1_000_000_000
+LONGEST = 9.2e9  # s: int64 nanoseconds end at 292 years
 
 
 def nanoseconds(t: ArrayLike) -> Stamps:
-    """Stamps as int64 nanoseconds: integers are taken as they are, floats are seconds.  Shape is kept."""
+    """Stamps as int64 nanoseconds: integers are taken as they are, floats are seconds.  Shape is kept.
+
+    Raises
+    ------
+    NotFiniteError, DataError
+        where a stamp is no number, or lies beyond 292 years of either side of zero.
+    """
     stamps = np.asarray(t)
     if np.issubdtype(stamps.dtype, np.integer):
         return stamps.astype(np.int64)
-    values = stamps.astype(np.float64)
+    values = numbers(t, "stamps")
     if not np.all(np.isfinite(values)):
         at = int(np.flatnonzero(~np.isfinite(values))[0])
         msg = f"stamp {at} is {values.flat[at]}; every stamp must be a finite number of seconds"
         raise NotFiniteError(msg)
+    if len(late := np.flatnonzero(np.abs(values) >= LONGEST)):
+        msg = (
+            f"stamp {late[0]} is {values.flat[late[0]]:.6g} s, which 64 bits of nanoseconds do not hold; "
+            "floats are seconds: give nanoseconds as integers"
+        )
+        raise DataError(msg)
     whole = np.floor(values)  # in two parts: one product would lose the last digits of Unix seconds
     return whole.astype(np.int64) * NS + np.round((values - whole) * NS).astype(np.int64)
 
@@ -37,9 +50,18 @@ def seconds(t: ArrayLike, origin: int = 0) -> Array:
     return (np.asarray(t, dtype=np.int64) - origin).astype(np.float64) * 1e-9
 
 
+def numbers(values: ArrayLike, what: str = "values") -> Array:
+    """Own, contiguous array of floats; raises `DataError` where that cannot be made."""
+    try:
+        return np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as fault:
+        msg = f"{what} must be an array of numbers, with rows of one length: {fault}"
+        raise DataError(msg) from None
+
+
 def frozen(values: ArrayLike) -> Array:
-    """Own, contiguous, read-only copy."""
-    own = np.array(values, dtype=np.float64, order="C")
+    """Own, contiguous, read-only copy; raises `DataError` where it does not hold numbers."""
+    own = numbers(values)
     own.flags.writeable = False
     return own
 
@@ -70,6 +92,9 @@ class Stream:
         if values.ndim != 2 or len(values) != len(t):
             msg = f"{len(t)} stamps need values of shape ({len(t)}, m), got {np.shape(self.values)}"
             raise ShapeError(msg)
+        if self.covers not in {"after", "before"}:
+            msg = f"a sample covers the interval 'after' its stamp or 'before' it, got {self.covers!r}"
+            raise DataError(msg)
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "values", values)
         if self.context is not None:
@@ -92,6 +117,10 @@ class Stream:
         """(N, c) what tells readings of equal stamp apart: the context, or nothing."""
         return np.zeros((len(self), 0)) if self.context is None else self.context
 
+    def finite(self) -> NDArray[np.bool_]:
+        """(N,) True where values and context are numbers."""
+        return np.asarray(np.isfinite(np.hstack([self.values, self.keys()])).all(axis=1))
+
     def repeated(self) -> NDArray[np.bool_]:
         """(N,) True where stamp and context repeat an earlier reading's."""
         table = np.column_stack([self.t - (self.t[0] if len(self) else 0), self.keys()])
@@ -107,7 +136,8 @@ class SensorLog(Mapping[str, Stream]):
 
     Building one checks every stream: finite values, stamps that do not go backwards, no reading twice.
     Raises `NotFiniteError`, `TimeOrderError` or `ShapeError`, each naming stream, sample and remedy.
-    `SensorLog.unchecked` skips the checks, so that a messy recording can be `sorted()` or made `unique()`.
+    `SensorLog.unchecked` skips the checks, so that a messy recording can be mended, as in
+    `SensorLog.unchecked(streams).finite().sorted().unique().check()`.
     """
 
     streams: Mapping[str, Stream]
@@ -116,14 +146,24 @@ class SensorLog(Mapping[str, Stream]):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "streams", dict(self.streams))
+        if wrong := [name for name, stream in self.streams.items() if not isinstance(stream, Stream)]:
+            msg = (
+                f"log[{wrong[0]!r}] is a {type(self.streams[wrong[0]]).__name__}; "
+                "a log is made of streams: Stream(t, values)"
+            )
+            raise DataError(msg)
         if self.checked:
             for name, stream in self.streams.items():
                 check_stream(name, stream)
 
     @classmethod
     def unchecked(cls, streams: Mapping[str, Stream], name: str = "log") -> SensorLog:
-        """A log as it came, to be mended by `sorted()`, `finite()` or `unique()`."""
+        """A log as it came, to be mended by `sorted()`, `finite()` or `unique()`; `run` checks it."""
         return cls(streams, name, checked=False)
+
+    def check(self) -> SensorLog:
+        """The same log, every stream checked: the end of mending."""
+        return self if self.checked else SensorLog(self.streams, self.name)
 
     def __getitem__(self, name: str) -> Stream:
         if name not in self.streams:
@@ -142,7 +182,8 @@ class SensorLog(Mapping[str, Stream]):
         return len(self.streams)
 
     def _each(self, change: Any) -> SensorLog:
-        return SensorLog({name: change(stream) for name, stream in self.streams.items()}, self.name)
+        streams = {name: change(stream) for name, stream in self.streams.items()}
+        return SensorLog(streams, self.name, self.checked)
 
     def sorted(self) -> SensorLog:
         """Every stream in the order of its stamps (stable)."""
@@ -154,11 +195,11 @@ class SensorLog(Mapping[str, Stream]):
 
     def finite(self) -> SensorLog:
         """Without readings that hold NaN or infinity."""
-        return self._each(lambda s: s.select(np.isfinite(s.values).all(axis=1)))
+        return self._each(lambda s: s.select(s.finite()))
 
     def replaced(self, **streams: Stream) -> SensorLog:
         """The same log with some streams exchanged or added."""
-        return SensorLog({**self.streams, **streams}, self.name)
+        return SensorLog({**self.streams, **streams}, self.name, self.checked)
 
     def without(self, *names: str) -> SensorLog:
         """The same log without some streams."""
@@ -193,7 +234,7 @@ class SensorLog(Mapping[str, Stream]):
 
 def check_stream(name: str, stream: Stream) -> None:
     """Raise if a stream is not finite, runs backwards or says a thing twice."""
-    bad = ~np.isfinite(stream.values).all(axis=1)
+    bad = ~stream.finite()
     if bad.any():
         at = int(np.flatnonzero(bad)[0])
         msg = (
