@@ -209,7 +209,7 @@ def warm_up(progress: Callable[[str], None] = lambda _: None) -> None:
     """Compile every kernel and every built-in model, so that first runs are quick."""
     import importlib
 
-    for name in ("extended", "smoothing", "iterated", "unscented"):
+    for name in ("extended", "smoothing", "iterated", "unscented", "looking", "linearize"):
         progress(f"kernel {name}")
         importlib.import_module(f"sequential.kernels.{name}")
     for name in ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared"):

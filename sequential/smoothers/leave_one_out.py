@@ -1,8 +1,10 @@
 """What a smoother would have predicted of each reading from all the others, in closed form.
 
-With residual r = z - h(x) and smoothed covariance P, leaving the reading out gives the residual
+With residual r = z - h(x), Jacobian H and smoothed covariance P, leaving the reading out gives the residual
 R T⁻¹ r with covariance R T⁻¹ R, where T = R - H P Hᵀ is the covariance of r (Plackett's update).  Its
 normalised square, rᵀ T⁻¹ r, is χ² with m degrees of freedom: the smoother's counterpart of the NIS.
+A reading that a robust loss gave the weight w was used with R/w; one that a gate rejected was left out
+already, so that its residual is r and the covariance R + H P Hᵀ.
 """
 
 from __future__ import annotations
@@ -10,59 +12,86 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sequential.compile import compiled
 from sequential.history import Innovations, Run
-from sequential.jacobians import difference
-from sequential.model import SensorModel, evaluate
-from sequential.timeline import Problem
+from sequential.model import Loss, SensorModel
+from sequential.timeline import Problem, sealed
 
-__all__ = ["leave_one_out", "residual_and_jacobian"]
+__all__ = ["leave_one_out"]
+
+Array = NDArray[np.float64]
 
 FLOOR = 1e-9  # T is positive definite in theory; eigenvalues below this share of R's are rounding
 
 
 def leave_one_out(problem: Problem, smoothed: Run, forward: Run | None = None) -> Mapping[str, Innovations]:
-    """Leave-one-out innovations of every sensor; readings that `forward` rejected stay rejected."""
-    node_of = np.searchsorted(problem.t, problem.reading_t)
+    """Leave-one-out innovations of every sensor.
+
+    Parameters
+    ----------
+    smoothed : estimates from all readings
+    forward : the filter pass that decided about gates and robust weights; without it all were used, and
+        weighted by their residuals at the smoothed states
+    """
+    residual, jacobian, node_of = look_back(problem, smoothed.mean)
     found = {}
     for index, (name, sensor) in enumerate(problem.model.sensors.items()):
         rows = np.flatnonzero(problem.schedule.sensor == index)
         m = sensor.manifold.dim
-        residual, cov = np.empty((len(rows), m)), np.empty((len(rows), m, m))
-        for k, reading in enumerate(rows):
-            node = node_of[reading]
-            r, h = residual_and_jacobian(problem, sensor, name, int(reading), smoothed.mean[node])
-            residual[k], cov[k] = _without(r, h, smoothed.cov[node], sensor)
+        r, h, p = residual[rows, :m], jacobian[rows, :m], smoothed.cov[node_of[rows]]
         accepted = np.ones(len(rows), bool) if forward is None else forward.innovations[name].accepted
+        weight = _weights(sensor, r, None if forward is None else forward.innovations[name])
+        left, cov = np.empty_like(r), np.empty((len(rows), m, m))
+        left[accepted], cov[accepted] = _without(
+            r[accepted], h[accepted], p[accepted], sensor.noise_cov, weight[accepted]
+        )
+        out = ~accepted
+        left[out], cov[out] = r[out], h[out] @ p[out] @ np.swapaxes(h[out], 1, 2) + sensor.noise_cov
         found[name] = Innovations(
-            problem.reading_t[rows], problem.reading_row[rows], residual, cov, accepted, "leave-one-out"
+            problem.reading_t[rows], problem.reading_row[rows], left, cov, accepted, "leave-one-out"
         )
     return found
 
 
-def residual_and_jacobian(
-    problem: Problem, sensor: SensorModel, name: str, reading: int, x: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residual local(expected, z) (m,) and Jacobian (m, d) of one reading at a state."""
-    f, m, d = problem.model.sensor_functions[name], sensor.manifold, problem.model.manifold.dim
-    u = problem.schedule.context[reading]
+def look_back(problem: Problem, trajectory: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Residuals (M, m), Jacobians (M, m, d) and nodes (M,) of all readings at a trajectory (K, n)."""
+    from sequential.kernels.looking import look_at_readings
 
-    def observe(at: np.ndarray) -> np.ndarray:
-        return evaluate(f.value, at, u, 0.0, f.params, m.size)
-
-    residual = m.local(observe(x), problem.schedule.z[reading, : m.size])
-    if f.jacobian is None:
-        return residual, difference(observe, x, problem.model.manifold, m)
-    return residual, evaluate(f.jacobian, x, u, 0.0, f.params, m.dim * d).reshape(m.dim, d)
+    whole = compiled(problem.model)
+    readings, widest = problem.schedule.z.shape
+    node_of = sealed(np.searchsorted(problem.t, problem.reading_t).astype(np.int64))
+    residual, jacobian = np.zeros((readings, widest)), np.zeros((readings, widest, whole.tables.d))
+    states = np.ascontiguousarray(trajectory)
+    look_at_readings(whole.tables, problem.schedule, states, node_of, residual, jacobian)
+    whole.raise_failures()
+    return residual, jacobian, node_of
 
 
-def _without(
-    r: np.ndarray, h: np.ndarray, cov: np.ndarray, sensor: SensorModel
-) -> tuple[np.ndarray, np.ndarray]:
-    noise = sensor.noise_cov
-    root = np.linalg.cholesky(noise)
+def _weights(sensor: SensorModel, r: Array, filtered: Innovations | None) -> Array:
+    """(M,) weights that the loss gave: by the innovation in a filter, by the residual in a batch."""
+    if sensor.loss is None:
+        return np.ones(len(r))
+    if filtered is not None:
+        return loss_weights(sensor.loss, filtered.nis() / r.shape[1])
+    return loss_weights(sensor.loss, np.einsum("ni,ij,nj->n", r, np.linalg.inv(sensor.noise_cov), r))
+
+
+def loss_weights(loss: Loss, squared: Array) -> Array:
+    """(M,) weights of residuals whose whitened squared norms are given."""
+    if loss.kind == "cauchy":
+        return loss.k**2 / (loss.k**2 + squared)
+    return np.minimum(1.0, loss.k / np.sqrt(np.maximum(squared, 1e-300)))
+
+
+def _without(r: Array, h: Array, p: Array, noise: Array, weight: Array) -> tuple[Array, Array]:
+    """Residuals (M, m) and covariances (M, m, m) of readings used with noise R/w, left out again."""
+    root = np.linalg.cholesky(noise) / np.sqrt(weight)[:, None, None]
     white = np.linalg.solve(root, h)
-    values, vectors = np.linalg.eigh(np.eye(len(r)) - white @ cov @ white.T)
-    inverse = (vectors / np.maximum(values, FLOOR)) @ vectors.T
-    # R T⁻¹ r = root · inverse · (root⁻¹ r), and R T⁻¹ R = root · inverse · rootᵀ.
-    return root @ inverse @ np.linalg.solve(root, r), root @ inverse @ root.T
+    values, vectors = np.linalg.eigh(np.eye(r.shape[1]) - white @ p @ np.swapaxes(white, 1, 2))
+    inverse = (vectors / np.maximum(values, FLOOR)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    # With R/w = A Aᵀ and T = A (1 - …) Aᵀ: the residual is A (1 - …)⁻¹ A⁻¹ r; its covariance takes R for R/w.
+    left = root @ inverse @ np.linalg.solve(root, r[..., None])
+    cov = root @ (inverse - np.eye(r.shape[1])) @ np.swapaxes(root, 1, 2) + noise
+    return left[..., 0], cov
