@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import GapError, MissingStreamError, ShapeError
+from sequential.errors import DataError, GapError, MissingStreamError, ShapeError
 from sequential.log import SensorLog, Stream, nanoseconds, seconds
 from sequential.model import StateSpace
 
@@ -68,6 +68,7 @@ def prepare(
     MissingStreamError, GapError, ShapeError
     """
     start = log.span()[0] if model.start_ns is None else model.start_ns
+    log = log.check()
     sensor, z, context, t, row = _readings(model, log, start)
     wanted = [t, np.array([start])] + ([] if at is None else [nanoseconds(at)])
     nodes = np.unique(np.concatenate(wanted))
@@ -105,6 +106,7 @@ def _readings(model: StateSpace, log: SensorLog, start: int) -> tuple[Ints, Arra
         if stream.context is not None:
             width = min(stream.context.shape[1], known.shape[1])
             known[:, :width] = stream.context[kept, :width]
+            _require_landmarks(name, stream.context[:, 0], kept, getattr(model_of, "landmarks", None))
         sensor.append(np.full(len(kept), index))
         z.append(padded)
         context.append(known)
@@ -124,7 +126,7 @@ def _readings(model: StateSpace, log: SensorLog, start: int) -> tuple[Ints, Arra
 
 def _require_columns(name: str, stream: Stream, size: int, context: int) -> None:
     if stream.values.shape[1] != size:
-        msg = f"log[{name!r}] has {stream.values.shape[1]} columns, its sensor measures {size}"
+        msg = f"log[{name!r}] has {stream.values.shape[1]} columns, the model takes {size}"
         raise ShapeError(msg)
     given = 0 if stream.context is None else stream.context.shape[1]
     if given < context:
@@ -134,6 +136,20 @@ def _require_columns(name: str, stream: Stream, size: int, context: int) -> None
 
 def _steps(
     model: StateSpace, log: SensorLog, nodes: Ints, max_gap: float | None
+def _require_landmarks(name: str, index: Array, kept: NDArray[Any], landmarks: Any) -> None:
+    """A compiled sensor reads its table at the index in the context, so the index must be a row of it."""
+    if landmarks is None:
+        return
+    seen, count = index[kept], len(landmarks)
+    wrong = np.flatnonzero((seen != np.floor(seen)) | (seen < 0) | (seen >= count))
+    if len(wrong):
+        msg = (
+            f"log[{name!r}] sees landmark {seen[wrong[0]]:g} at sample {kept[wrong[0]]}, but its sensor has "
+            f"{count} landmarks, 0 to {count - 1}; mend the context or the sensor's table"
+        )
+        raise DataError(msg)
+
+
 ) -> tuple[Ints, Array, Ints, Array]:
     """Steps from node to node, cut at every input stamp."""
     if model.input is None:
