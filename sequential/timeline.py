@@ -67,8 +67,8 @@ def prepare(
     ------
     MissingStreamError, GapError, ShapeError
     """
-    start = log.span()[0] if model.start_ns is None else model.start_ns
     log = log.check()
+    start = log.span()[0] if model.start_ns is None else model.start_ns
     sensor, z, context, t, row = _readings(model, log, start)
     wanted = [t, np.array([start])] + ([] if at is None else [nanoseconds(at)])
     nodes = np.unique(np.concatenate(wanted))
@@ -104,9 +104,9 @@ def _readings(model: StateSpace, log: SensorLog, start: int) -> tuple[Ints, Arra
         padded[:, : stream.values.shape[1]] = stream.values[kept]
         known = np.zeros((len(kept), max(contexts)))
         if stream.context is not None:
+            _require_landmarks(name, stream.context[:, 0], kept, getattr(model_of, "landmarks", None))
             width = min(stream.context.shape[1], known.shape[1])
             known[:, :width] = stream.context[kept, :width]
-            _require_landmarks(name, stream.context[:, 0], kept, getattr(model_of, "landmarks", None))
         sensor.append(np.full(len(kept), index))
         z.append(padded)
         context.append(known)
@@ -134,8 +134,6 @@ def _require_columns(name: str, stream: Stream, size: int, context: int) -> None
         raise ShapeError(msg)
 
 
-def _steps(
-    model: StateSpace, log: SensorLog, nodes: Ints, max_gap: float | None
 def _require_landmarks(name: str, index: Array, kept: NDArray[Any], landmarks: Any) -> None:
     """A compiled sensor reads its table at the index in the context, so the index must be a row of it."""
     if landmarks is None:
@@ -150,6 +148,8 @@ def _require_landmarks(name: str, index: Array, kept: NDArray[Any], landmarks: A
         raise DataError(msg)
 
 
+def _steps(
+    model: StateSpace, log: SensorLog, nodes: Ints, max_gap: float | None
 ) -> tuple[Ints, Array, Ints, Array]:
     """Steps from node to node, cut at every input stamp."""
     if model.input is None:
