@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sequential.evaluate.blame import Blame
 from sequential.evaluate.consistency import Consistency, nis_summary
-from sequential.evaluate.moments import pauses, tail, worst_span
+from sequential.evaluate.moments import Tail, pauses, tail, worst_span
 from sequential.evaluate.whiteness import whiteness
 from sequential.history import Innovations, Run
 from sequential.model import SensorModel, StateSpace
@@ -82,6 +82,7 @@ class _Seen:
     nis: Array
     whole: float
     summary: Consistency
+    few: Tail | None  # where a few readings carry the sum and the others are below what is expected
 
     @classmethod
     def of(cls, name: str, sensor: SensorModel, innovations: Innovations, run: Run) -> _Seen:
@@ -89,7 +90,9 @@ class _Seen:
         accepted = innovations.accepted
         nis = innovations.nis()[accepted] if len(t) else np.zeros(0)
         whole = float(run.t[-1] - run.t[0]) * 1e-9
-        return cls(name, sensor, innovations, t[accepted], nis, whole, nis_summary(innovations))
+        summary = nis_summary(innovations)
+        few = tail(t[accepted], nis, whole) if summary.median < summary.expected_median else None
+        return cls(name, sensor, innovations, t[accepted], nis, whole, summary, few)
 
     @property
     def title(self) -> str:
@@ -124,6 +127,8 @@ def _of_level(seen: _Seen, balance: Blame | None) -> Iterator[Finding]:
 
 def _level_advice(seen: _Seen, balance: Blame | None) -> str:
     s = seen.summary
+    if seen.few is not None and s.mean > s.expected:
+        return f"{seen.few.few} of {seen.few.count} readings make it so: see to them before scaling any noise"
     if balance is not None and balance.guilty is not None and balance.clear:
         guilty = balance.guilty
         after = guilty.nis.get(seen.name, float("nan"))
@@ -138,8 +143,8 @@ def _level_advice(seen: _Seen, balance: Blame | None) -> str:
 def _of_tail(seen: _Seen) -> Iterator[Finding]:
     """Whether a few readings make the mean."""
     s = seen.summary
-    few = tail(seen.t, seen.nis, seen.whole)
-    if few is None or s.median >= s.expected_median:
+    few = seen.few
+    if few is None:
         return
     what = (
         f"a burst during t = {few.burst[0]:.0f}-{few.burst[1]:.0f} s" if few.burst else "outliers or bursts"

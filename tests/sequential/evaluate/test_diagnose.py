@@ -72,6 +72,8 @@ def test_a_little_outside_the_band_is_a_warning(rng):
 def test_outliers_are_not_a_level(rng):
     white = 0.4 * rng.standard_normal((COUNT, 3))
     white[::20] *= 30.0
+    (level,) = findings(run_of(white), metric="mean NIS")
+    assert "readings make it so: see to them before scaling any noise" in level.advice
     (few,) = findings(run_of(white), metric="tail of the NIS")
     assert few.level == "WARN"
     assert "of 200 readings of gps carry" in str(few)
