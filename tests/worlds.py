@@ -3,9 +3,10 @@
 A world draws logs of itself (`world.draw(rng)`), so that an estimator's claims can be held against the truth.
 """
 
+import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -220,3 +221,22 @@ def nees(run, truth, rows):
     """(K,) normalised estimation error squared of the nodes at the given rows of the truth."""
     error = run.manifold.local(run.mean[rows], truth[rows])
     return np.einsum("ki,kij,kj->k", error, np.linalg.inv(run.cov[rows]), error)
+
+
+def with_functions(model, change):
+    """The same model with every set of lowered functions put through `change`."""
+    other = copy.copy(model)
+    object.__setattr__(other, "process_functions", change(model.process_functions))
+    sensors = {name: change(f) for name, f in model.sensor_functions.items()}
+    object.__setattr__(other, "sensor_functions", sensors)
+    return other
+
+
+def without_jacobians(model):
+    """The same model, every Jacobian differenced."""
+    return with_functions(model, lambda f: replace(f, jacobian=None, advance=None, carry=None))
+
+
+def without_fusion(model):
+    """The same model, covariances pushed by the dense Jacobian."""
+    return with_functions(model, lambda f: replace(f, advance=None, carry=None))

@@ -99,17 +99,13 @@ def jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
 
 
 def noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
-    """White force, white rate, integration error and bias walks: isotropic, so no rotation is needed.
+    """White force, white rate, integration error and bias walks.
 
-    The gyro block is Jr Jrᵀ dt σ², which differs from dt σ² by the square of the turn of one sample.
+    All are isotropic, and so stay the same in axes that turn: no rotation is needed.
     """
     d = int(p[1])
-    g = right_jacobian((u[3] - x[13]) * dt, (u[4] - x[14]) * dt, (u[5] - x[15]) * dt)
     for i in range(3):
-        for j in range(3):
-            out[i * d + j] += (
-                dt * p[6] * (g[3 * i] * g[3 * j] + g[3 * i + 1] * g[3 * j + 1] + g[3 * i + 2] * g[3 * j + 2])
-            )
+        out[i * d + i] += dt * p[6]
         at, speed = 3 + i, 6 + i
         out[at * d + at] += 0.25 * dt * dt * dt * p[5] + dt * p[9]
         out[at * d + speed] += 0.5 * dt * dt * p[5]

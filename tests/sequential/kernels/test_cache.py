@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-import sequential.kernels as kernels
+from sequential import kernels
 
 FOLDER = Path(kernels.__file__).parent
 
@@ -11,7 +11,9 @@ FOLDER = Path(kernels.__file__).parent
 def test_every_kernel_that_others_inline_is_part_of_the_digest():
     imported = set()
     for path in FOLDER.glob("*.py"):
-        imported |= set(re.findall(r"^from sequential\.kernels\.(\w+) import", path.read_text(), re.MULTILINE))
+        imported |= set(
+            re.findall(r"^from sequential\.kernels\.(\w+) import", path.read_text(), re.MULTILINE)
+        )
     assert {f"kernels/{name}.py" for name in imported} <= set(kernels.INLINED)
     assert all((FOLDER.parent / name).exists() for name in kernels.INLINED)
 

@@ -1,4 +1,4 @@
-"""The compiled charts give what the NumPy manifolds give, on every manifold and up to the edge of the chart."""
+"""The compiled charts give what the NumPy manifolds give, on every manifold, up to the edge of the chart."""
 
 import numpy as np
 import pytest
