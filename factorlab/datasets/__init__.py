@@ -14,12 +14,17 @@ from pathlib import Path
 
 from factorlab.datasets.dataset import Dataset, Truth
 from factorlab.datasets.kitti import load_kitti
+from factorlab.datasets.mrclam import load_mrclam
+from factorlab.datasets.plaza import load_plaza
 from sequential.errors import DataError
 
 __all__ = ["NAMES", "Dataset", "Truth", "load"]
 
 _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
     "kitti": lambda use_every, data, _robot: [load_kitti(use_every, data)],
+    "plaza1": lambda _use_every, data, _robot: [load_plaza(1, data)],
+    "plaza2": lambda _use_every, data, _robot: [load_plaza(2, data)],
+    "mrclam": lambda _use_every, data, robot: load_mrclam(data, robot),
 }
 NAMES = tuple(_LOADERS)
 
@@ -32,7 +37,8 @@ def load(
     Parameters
     ----------
     name : one of `NAMES`
-    use_every : of the readings that can be held out, one in this many is used; 1 holds nothing out
+    use_every : where held-out readings score the result (kitti), one in this many is used and the others
+        are held out; 1 holds nothing out.  Recordings with a truth of their own use all.
     data : folder of the files, where it is not the usual one
     robot : only this vehicle, where the recording has several
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from sequential.errors import ModelError
-from sequential.manifold import SE2, Manifold
+from sequential.manifold import SE2, Manifold, Vector
 from sequential.model import Functions, ProcessModel, as_params
 from sequential.models.parts import find_part
 
 __all__ = ["Unicycle"]
 
-STRAIGHT = 1e-6  # rad: below this turn, the series of the arc is exact to double precision
+STRAIGHT = 1e-3  # rad: below this turn the series are exact to 1e-13, and the closed forms lose digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +27,14 @@ class Unicycle(ProcessModel):
     slip : m/√m, error along the track that grows with the distance driven
     turn_slip : rad/√rad, heading error that grows with the angle turned
     drift : rad/√m, heading error that grows with the distance driven
+    scale : name of a vector part of two numbers, the shares by which speed and turn rate are really larger
+        than the wheels say: u is taken as ((1 + scale[0]) u[0], (1 + scale[1]) u[1])
     pose : name of the SE(2) part; the first one unless given
 
     Notes
     -----
-    All five add variances in proportion to dt, |v|dt or |ω|dt, so that a step may be cut in two without
-    changing the result.  Tangent order (x, y, heading), right perturbations: GTSAM's Pose2.
+    The noise terms add variances in proportion to dt, |v|dt or |ω|dt, so that a step may be cut in two
+    without changing the result.  Tangent order (x, y, heading), right perturbations: GTSAM's Pose2.
     """
 
     along: float
@@ -41,6 +43,7 @@ class Unicycle(ProcessModel):
     slip: float = 0.0
     turn_slip: float = 0.0
     drift: float = 0.0
+    scale: str | None = None
     pose: str | None = None
 
     def functions(self, manifold: Manifold) -> Functions:
@@ -50,23 +53,40 @@ class Unicycle(ProcessModel):
             msg = f"Unicycle's densities must be zero or more, got {sigmas}"
             raise ModelError(msg)
         storage, tangent, _ = find_part(manifold, (SE2,), self.pose, "Unicycle")
-        params = as_params(storage, tangent, manifold.size, manifold.dim, [s * s for s in sigmas])
+        scale = (0, 0, 0)
+        if self.scale is not None:
+            s_storage, s_tangent, part = find_part(manifold, (Vector,), self.scale, "Unicycle's scale")
+            if part.size != 2:
+                msg = f"Unicycle's scale {self.scale!r} has {part.size} numbers; 2, for speed and turn rate"
+                raise ModelError(msg)
+            scale = (1, s_storage, s_tangent)
+        variances = [s * s for s in sigmas]
+        params = as_params(storage, tangent, manifold.size, manifold.dim, variances, scale)
         return Functions(drive, drive_jacobian, params, 2, drive_noise, helpers=HELPERS)
 
 
-def arc(u: Any, dt: float) -> tuple[float, float, float]:
-    """Pose of the vehicle after dt in its own starting frame."""
-    turn = u[1] * dt
-    length = u[0] * dt
+def travel(x: Any, u: Any, dt: float, p: Any) -> tuple[float, float]:
+    """Length and angle of the arc, as the scales have it."""
+    length, turn = u[0] * dt, u[1] * dt
+    if p[10] > 0.0:
+        length *= 1.0 + x[int(p[11])]
+        turn *= 1.0 + x[int(p[11]) + 1]
+    return length, turn
+
+
+def arc(length: float, turn: float) -> tuple[float, float]:
+    """Where the vehicle stands after an arc, in its own starting frame."""
     if abs(turn) < STRAIGHT:
-        return length * (1.0 - turn * turn / 6.0), length * turn / 2.0, turn
-    return length * math.sin(turn) / turn, length * (1.0 - math.cos(turn)) / turn, turn
+        square = turn * turn
+        return length * (1.0 - square / 6.0), length * turn * (0.5 - square / 24.0)
+    return length * math.sin(turn) / turn, length * (1.0 - math.cos(turn)) / turn
 
 
 def drive(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
-    """Compose the pose with the arc; p = [storage, tangent, n, d, variances (6)]."""
+    """Compose the pose with the arc; p = [storage, tangent, n, d, variances (6), scale (3)]."""
     at = int(p[0])
-    a, b, turn = arc(u, dt)
+    length, turn = travel(x, u, dt, p)
+    a, b = arc(length, turn)
     c, s = math.cos(x[at + 2]), math.sin(x[at + 2])
     for i in range(int(p[2])):
         out[i] = x[i]
@@ -77,9 +97,10 @@ def drive(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
 
 
 def drive_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
-    """Adjoint of the inverse arc on the pose, identity elsewhere."""
+    """Adjoint of the inverse arc on the pose, identity elsewhere; right Jacobian of the arc on the scales."""
     at, d = int(p[1]), int(p[3])
-    a, b, turn = arc(u, dt)
+    length, turn = travel(x, u, dt, p)
+    a, b = arc(length, turn)
     c, s = math.cos(turn), math.sin(turn)
     for i in range(d * d):
         out[i] = 0.0
@@ -92,6 +113,23 @@ def drive_jacobian(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     out[row + d] = -s
     out[row + d + 1] = c
     out[row + d + 2] = c * a + s * b
+    if p[10] > 0.0:
+        column = at * d + int(p[12])
+        along, across = arc(u[0] * dt, turn)
+        out[column], out[column + d] = along, -across
+        bend, lead = bent(turn)
+        angle = u[1] * dt
+        out[column + 1] = bend * length * angle
+        out[column + d + 1] = lead * length * angle
+        out[column + 2 * d + 1] = angle
+
+
+def bent(turn: float) -> tuple[float, float]:
+    """(θ - sin θ) / θ² and (1 - cos θ) / θ²: how an arc's end answers to its angle, along the end's axes."""
+    square = turn * turn
+    if abs(turn) < STRAIGHT:
+        return turn / 6.0, 0.5 - square / 24.0
+    return (turn - math.sin(turn)) / square, (1.0 - math.cos(turn)) / square
 
 
 def drive_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
@@ -103,4 +141,4 @@ def drive_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     out[(at + 2) * d + at + 2] += p[6] * dt + p[8] * angle + p[9] * distance
 
 
-HELPERS = (arc,)
+HELPERS = (travel, arc, bent)

@@ -27,11 +27,11 @@ class IteratedSmoother:
 
     Parameters
     ----------
-    max_iterations : Gauss-Newton steps
+    max_iterations : Gauss-Newton steps; six or so without a robust loss, dozens with a Cauchy loss
     tolerance : stop when no tangent step exceeds this many standard deviations of the state
     """
 
-    max_iterations: int = 30
+    max_iterations: int = 100
     tolerance: float = 1e-4
     check: bool = True
     name = "ieks"
