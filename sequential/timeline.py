@@ -39,6 +39,7 @@ class Schedule(NamedTuple):
     sensor: Ints  # (M,) which sensor of the model
     z: Array  # (M, largest measurement)
     context: Array  # (M, largest context)
+    z_flat: Array  # z once more, row after row
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +78,8 @@ def prepare(
     reading_ptr = np.searchsorted(t[order], nodes, side="left")
     reading_ptr = np.append(reading_ptr, len(t)).astype(np.int64)
     steps = _steps(model, log, nodes, max_gap)
-    schedule = Schedule(*map(sealed, (*steps, reading_ptr, sensor[order], z[order], context[order])))
+    ordered = (z[order], context[order], z[order].ravel())
+    schedule = Schedule(*map(sealed, (*steps, reading_ptr, sensor[order], *ordered)))
     return Problem(model, schedule, nodes, t[order], row[order], log.name)
 
 

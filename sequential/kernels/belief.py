@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numba import njit
-
+from sequential.kernels.call import bare
 from sequential.kernels.matrices import (
     add_product_nt,
     cholesky,
@@ -22,11 +20,12 @@ __all__ = ["LOG_TWO_PI", "gain_and_innovation", "joseph"]
 LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):
     """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹; returns (NIS, log det S), NIS negative if S is not positive definite.
 
-    `cross` holds H P (m, d) and `gain` Kᵀ (m, d); `lower` the Cholesky factor of S.
+    `gain` holds Kᵀ (m, d), `lower` the Cholesky factor of S; `cross` (m, d) is scratch: H P, then the
+    whitened residual in its first column.
     """
     multiply(h, p, cross, m, d, d)
     multiply_nt(cross, h, innovation_cov, m, d, m)
@@ -42,18 +41,17 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
     solve_lower(lower, gain, m, d)
     solve_lower_transposed(lower, gain, m, d)
     nis, log_det = 0.0, 0.0
-    white = np.empty(m)
     for i in range(m):
         s = residual[i]
         for k in range(i):
-            s -= lower[i, k] * white[k]
-        white[i] = s / lower[i, i]
-        nis += white[i] * white[i]
+            s -= lower[i, k] * cross[k, 0]
+        cross[i, 0] = s / lower[i, i]
+        nis += cross[i, 0] * cross[i, 0]
         log_det += 2.0 * math.log(lower[i, i])
     return nis, log_det
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):
     """P <- (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; symmetric for any gain."""
     for i in range(d):

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
 from numba.extending import register_jitable
 
+from sequential.kernels.call import bare
 from sequential.kernels.poses import (
     se2_adjoint_inverse,
     se2_exp,
@@ -31,13 +31,13 @@ for helper in (rotation, quaternion_exp, quaternion_product, right_jacobian):
 VECTOR, SO2, SO3, SE2, SE3, NAV = range(6)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def wrap(angle):
     """Angle in ]-π, π]."""
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):
     """out = x ⊕ xi over the blocks first:last, arrays flat from their offsets; out may be x."""
     for b in range(first, last):
@@ -76,7 +76,7 @@ def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):
                         out[o + 1 + at + i] = x[s + 1 + at + i] + turned
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def local(table, first, last, x, x_at, y, y_at, out, out_at):
     """out = the tangent vector at x that leads to y."""
     for b in range(first, last):
@@ -112,7 +112,7 @@ def local(table, first, last, x, x_at, y, y_at, out, out_at):
                 out[o + 3], out[o + 4], out[o + 5] = v[0], v[1], v[2]
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):
     """Linearise e = local(x, y): `inverse` = (∂e/∂y)⁻¹ and `turn` = -(∂e/∂y)⁻¹ ∂e/∂x, both (d, d)."""
     local(table, 0, blocks, x, x_at, y, y_at, e, 0)
@@ -143,7 +143,7 @@ def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):
                 nav_transport(a, e, t, turn, inverse)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def nav_transport(a, e, t, turn, inverse):
     """Position and velocity blocks: Aᵀ, and -Aᵀ [e]x from the rotation, with Aᵀ given row by row."""
     for at in (3, 6):

@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
-from sequential.kernels.call import call
+from sequential.kernels.call import allocating, bare, call
 from sequential.kernels.charts import retract, transport
-from sequential.kernels.matrices import multiply, push_covariance
+from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply, push_covariance
 from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
 from sequential.kernels.sensing import loss_weight, measure, process_jacobian, sensor_jacobian
 
@@ -42,7 +42,7 @@ FILTERED = types.NamedTuple([_f2, _f3, _f2, _f3, _f3, _f2, _f3, _i1], Filtered)
 FINISHED = types.Tuple([types.float64, types.int64])
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def predict(model, plan, node, belief, x, p, phi, keep, work):
     """Carry belief = [x | p] (and phi with `keep`) along the steps that lead to a node."""
     d, width = model.d, plan.inputs.shape[1]
@@ -60,42 +60,17 @@ def predict(model, plan, node, belief, x, p, phi, keep, work):
         call(model.noise, x, 0, plan.inputs, u, dt, model.params, 0, p, 0)
         if keep != 0:
             multiply(f, phi, flat, d, d, d)
-            phi[:, :] = flat
-        x[:] = after
+            copy_matrix(flat, phi)
+        copy_vector(after, x)
 
 
-@njit(cache=True, error_model="numpy")
-def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):
-    """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if S is indefinite."""
+@allocating
+def iterate(model, plan, reading, x, p, weight, iterations, update, work, expected, residual):
+    """Relinearise an update until it settles, from the plain update that stands in `delta`."""
     s = plan.sensor[reading]
     m, d, blocks = model.z_dim[s], model.d, len(model.table)
     h, flat, cross, gain, innovation_cov, lower, scaled, delta, e = update
     noise = model.noise_cov[s]
-    measure(model, plan, reading, x, 0, expected, residual)
-    sensor_jacobian(model, plan, reading, x, 0, expected, flat, h)
-    nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
-    for i in range(m):
-        out.residual[reading, i] = residual[i]
-        for j in range(m):
-            out.residual_cov[reading, i, j] = innovation_cov[i, j]
-    if nis < 0.0:
-        return math.nan
-    if nis > model.gate[s]:
-        out.accepted[reading] = 0
-        return 0.0
-    out.accepted[reading] = 1
-    log_likelihood = -0.5 * (nis + log_det + m * LOG_TWO_PI)
-    weight = loss_weight(model.loss[s], model.loss_k[s], nis / m)
-    if weight < 1.0:
-        gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain)
-    for i in range(d):
-        delta[i] = 0.0
-        for k in range(m):
-            delta[i] += gain[k, i] * residual[k]
-    if iterations <= 1:
-        joseph(p, h, gain, noise, weight, m, d, work[0], work[1], scaled)
-        retract(model.table, 0, blocks, x, 0, delta, 0, x, 0)
-        return log_likelihood
     start, prior = x.copy(), p.copy()
     retract(model.table, 0, blocks, start, 0, delta, 0, x, 0)
     turn, inverse = np.empty((d, d)), np.empty((d, d))
@@ -128,18 +103,77 @@ def absorb(model, plan, reading, x, p, iterations, update, work, expected, resid
         if largest < CONVERGED:
             break
     joseph(p, h, gain, noise, weight, m, d, work[0], work[1], scaled)
+
+
+@bare
+def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):
+    """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if S is indefinite."""
+    s = plan.sensor[reading]
+    m, d, blocks = model.z_dim[s], model.d, len(model.table)
+    h, flat, cross, gain, innovation_cov, lower, scaled, delta, _ = update
+    noise = model.noise_cov[s]
+    measure(model, plan, reading, x, 0, expected, residual)
+    sensor_jacobian(model, plan, reading, x, 0, expected, flat, h)
+    nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
+    for i in range(m):
+        out.residual[reading, i] = residual[i]
+        for j in range(m):
+            out.residual_cov[reading, i, j] = innovation_cov[i, j]
+    if nis < 0.0:
+        return math.nan
+    if nis > model.gate[s]:
+        out.accepted[reading] = 0
+        return 0.0
+    out.accepted[reading] = 1
+    log_likelihood = -0.5 * (nis + log_det + m * LOG_TWO_PI)
+    weight = loss_weight(model.loss[s], model.loss_k[s], nis / m)
+    if weight < 1.0:
+        gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain)
+    for i in range(d):
+        delta[i] = 0.0
+        for k in range(m):
+            delta[i] += gain[k, i] * residual[k]
+    if iterations <= 1:
+        joseph(p, h, gain, noise, weight, m, d, work[0], work[1], scaled)
+        retract(model.table, 0, blocks, x, 0, delta, 0, x, 0)
+        return log_likelihood
+    iterate(model, plan, reading, x, p, weight, iterations, update, work, expected, residual)
     return log_likelihood
+
+
+@bare
+def filter_nodes(model, plan, belief, x, p, phi, iterations, work, update, expected, residual, keep, out):
+    """The loop of `filter_log`, with every array at hand."""
+    log_likelihood = 0.0
+    for node in range(len(plan.reading_ptr) - 1):
+        if keep != 0:
+            fill_diagonal(phi, 1.0)
+        predict(model, plan, node, belief, x, p, phi, keep, work)
+        if keep != 0:
+            copy_vector(x, out.predicted_mean[node])
+            copy_matrix(p, out.predicted_cov[node])
+            copy_matrix(phi, out.transition[node])
+        for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
+            gain_log = absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out)
+            if math.isnan(gain_log):
+                copy_vector(x, out.mean[node])
+                copy_matrix(p, out.cov[node])
+                return log_likelihood, reading
+            log_likelihood += gain_log
+        copy_vector(x, out.mean[node])
+        copy_matrix(p, out.cov[node])
+    return log_likelihood, -1
 
 
 @njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, FILTERED), cache=True, error_model="numpy")
 def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
     """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite)."""
     n, d = model.n, model.d
-    nodes, widest = len(plan.reading_ptr) - 1, plan.z.shape[1]
+    widest = plan.z.shape[1]
     belief = np.empty(n + d * d)
     x, p = belief[:n], belief[n:].reshape((d, d))
-    x[:] = prior_mean
-    p[:, :] = prior_cov
+    copy_vector(prior_mean, x)
+    copy_matrix(prior_cov, p)
     phi = np.eye(d)
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
     update = (
@@ -148,24 +182,6 @@ def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
         np.empty(d), np.empty(d),
     )  # fmt: skip
     expected, residual = np.empty(widest), np.empty(widest)
-    log_likelihood = 0.0
-    for node in range(nodes):
-        if keep != 0:
-            phi[:, :] = 0.0
-            for i in range(d):
-                phi[i, i] = 1.0
-        predict(model, plan, node, belief, x, p, phi, keep, work)
-        if keep != 0:
-            out.predicted_mean[node] = x
-            out.predicted_cov[node] = p
-            out.transition[node] = phi
-        for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
-            gain_log = absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out)
-            if math.isnan(gain_log):
-                out.mean[node] = x
-                out.cov[node] = p
-                return log_likelihood, reading
-            log_likelihood += gain_log
-        out.mean[node] = x
-        out.cov[node] = p
-    return log_likelihood, -1
+    return filter_nodes(
+        model, plan, belief, x, p, phi, iterations, work, update, expected, residual, keep, out
+    )

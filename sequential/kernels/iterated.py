@@ -13,9 +13,17 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.belief import gain_and_innovation, joseph
+from sequential.kernels.call import bare
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
-from sequential.kernels.matrices import multiply, multiply_nt, push_covariance
+from sequential.kernels.matrices import (
+    copy_matrix,
+    copy_vector,
+    fill_diagonal,
+    multiply,
+    multiply_nt,
+    push_covariance,
+)
 from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
 from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
 
@@ -36,7 +44,7 @@ _f2, _f3 = types.float64[:, ::1], types.float64[:, :, ::1]
 LINEARISED = types.NamedTuple([_f2, _f3, _f2, _f3, _f3], Linearised)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, expected, residual):
     """Update the belief about δ by one reading linearised at the trajectory, with the robust weight there."""
     s = plan.sensor[reading]
@@ -47,7 +55,9 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     sensor_jacobian(model, plan, reading, trajectory, at, expected, flat, h)
     weight = 1.0
     if model.loss[s] != 0:
-        weight = loss_weight(model.loss[s], model.loss_k[s], whitened_square(noise, residual, m, lower))
+        weight = loss_weight(
+            model.loss[s], model.loss_k[s], whitened_square(noise, residual, m, lower, cross)
+        )
     for i in range(m):
         for k in range(d):
             residual[i] -= h[i, k] * mean[k]
@@ -61,11 +71,10 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     return 0
 
 
-@njit(cache=True, error_model="numpy")
-def whitened_square(noise, residual, m, lower):
-    """Residualᵀ R⁻¹ residual by forward substitution."""
+@bare
+def whitened_square(noise, residual, m, lower, white):
+    """Residualᵀ R⁻¹ residual by forward substitution; `white` (m, 1 or more) is scratch."""
     total = 0.0
-    white = np.empty(m)
     for j in range(m):
         for i in range(j, m):
             s = noise[i, j]
@@ -75,46 +84,34 @@ def whitened_square(noise, residual, m, lower):
     for i in range(m):
         s = residual[i]
         for k in range(i):
-            s -= lower[i, k] * white[k]
-        white[i] = s / lower[i, i]
-        total += white[i] * white[i]
+            s -= lower[i, k] * white[k, 0]
+        white[i, 0] = s / lower[i, i]
+        total += white[i, 0] ** 2
     return total
 
 
-@njit(types.int64(MODEL, SCHEDULE, f1, f2, f2, LINEARISED), cache=True, error_model="numpy")
-def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):
-    """Linearise about the trajectory (K, n) and filter; returns -1, or the reading where S was indefinite."""
+@bare
+def filter_chain(model, plan, prior, trajectory, states, belief, x, q, frames, vectors, work, update, out):
+    """The loop of `filter_steps`, with every array at hand."""
     n, d, blocks = model.n, model.d, len(model.table)
-    nodes, widest = len(plan.reading_ptr) - 1, plan.z.shape[1]
-    belief = np.empty(n + d * d)
-    x, q = belief[:n], belief[n:].reshape((d, d))
-    phi, turn, inverse = np.empty((d, d)), np.empty((d, d)), np.empty((d, d))
-    work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
-    update = (
-        np.empty((widest, d)), np.empty(widest * d), np.empty((widest, d)), np.empty((widest, d)),
-        np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
-    )  # fmt: skip
-    expected, residual = np.empty(widest), np.empty(widest)
-    states = trajectory.reshape(-1)
-    mean, cov, e, step = np.zeros(d), np.empty((d, d)), np.empty(d), np.empty(d)
-    for node in range(nodes):
+    phi, turn, inverse, cov = frames
+    mean, e, step, expected, residual = vectors
+    for node in range(len(plan.reading_ptr) - 1):
         if node == 0:
-            x[:] = prior_mean
-            cov[:, :] = prior_cov
+            copy_vector(prior[0], x)
+            copy_matrix(prior[1], cov)
             transport(model.table, blocks, d, x, 0, states, 0, e, turn, inverse)
             push_covariance(inverse, cov, work[0], work[1], d)
-            phi[:, :] = turn
+            copy_matrix(turn, phi)
         else:
-            x[:] = trajectory[node - 1]
-            q[:, :] = 0.0
-            phi[:, :] = 0.0
-            for i in range(d):
-                phi[i, i] = 1.0
+            copy_vector(trajectory[node - 1], x)
+            fill_diagonal(q, 0.0)
+            fill_diagonal(phi, 1.0)
             predict(model, plan, node, belief, x, q, phi, 1, work)
             transport(model.table, blocks, d, x, 0, states, node * n, e, turn, inverse)
             push_covariance(inverse, q, work[0], work[1], d)
             multiply(turn, phi, work[0], d, d, d)
-            phi[:, :] = work[0]
+            copy_matrix(work[0], phi)
             multiply(phi, cov, work[0], d, d, d)
             multiply_nt(work[0], phi, cov, d, d, d)
             for i in range(d):
@@ -125,16 +122,36 @@ def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):
             step[i] = 0.0
             for k in range(d):
                 step[i] += phi[i, k] * mean[k] - inverse[i, k] * e[k]
-        mean[:] = step
-        out.predicted_mean[node] = mean
-        out.predicted_cov[node] = cov
-        out.transition[node] = phi
+        copy_vector(step, mean)
+        copy_vector(mean, out.predicted_mean[node])
+        copy_matrix(cov, out.predicted_cov[node])
+        copy_matrix(phi, out.transition[node])
         for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
             absorbed = absorb_step(
                 model, plan, reading, states, node * n, mean, cov, update, work, expected, residual
             )
             if absorbed < 0:
                 return reading
-        out.mean[node] = mean
-        out.cov[node] = cov
+        copy_vector(mean, out.mean[node])
+        copy_matrix(cov, out.cov[node])
     return -1
+
+
+@njit(types.int64(MODEL, SCHEDULE, f1, f2, f2, LINEARISED), cache=True, error_model="numpy")
+def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):
+    """Linearise about the trajectory (K, n) and filter; returns -1, or the reading where S was indefinite."""
+    n, d, widest = model.n, model.d, plan.z.shape[1]
+    belief = np.empty(n + d * d)
+    x, q = belief[:n], belief[n:].reshape((d, d))
+    frames = (np.empty((d, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
+    work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
+    update = (
+        np.empty((widest, d)), np.empty(widest * d), np.empty((widest, d)), np.empty((widest, d)),
+        np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
+    )  # fmt: skip
+    states = trajectory.reshape(-1)
+    vectors = (np.zeros(d), np.empty(d), np.empty(d), np.empty(widest), np.empty(widest))
+    prior = (prior_mean, prior_cov)
+    return filter_chain(
+        model, plan, prior, trajectory, states, belief, x, q, frames, vectors, work, update, out
+    )

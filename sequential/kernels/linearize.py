@@ -12,9 +12,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
+from sequential.kernels.call import bare
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
-from sequential.kernels.matrices import cholesky, multiply, push_covariance, solve_lower
+from sequential.kernels.matrices import (
+    cholesky,
+    copy_matrix,
+    copy_vector,
+    fill_diagonal,
+    multiply,
+    push_covariance,
+    solve_lower,
+)
 from sequential.kernels.records import MODEL, SCHEDULE, f1, f2, i1
 from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
 
@@ -38,7 +47,7 @@ ROWS = types.NamedTuple([i1, _f2, _f2, _f2, _f1], Rows)
 RESULT = types.Tuple([types.float64, types.int64])
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def loss_cost(kind, k, squared):  # type: ignore[no-untyped-def]
     """Half the squared norm, or what a robust loss makes of it."""
     if kind == 0:
@@ -49,7 +58,7 @@ def loss_cost(kind, k, squared):  # type: ignore[no-untyped-def]
     return 0.5 * squared if r <= k else k * (r - 0.5 * k)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def write_reading(model, plan, reading, states, at, row, moving, static, update, rows):  # type: ignore[no-untyped-def]
     """Whitened rows of one reading; returns its cost."""
     s = plan.sensor[reading]
@@ -76,7 +85,7 @@ def write_reading(model, plan, reading, states, at, row, moving, static, update,
     return loss_cost(model.loss[s], model.loss_k[s], squared)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def write_motion(phi, q, e, inverse, row, moving, static, lower, block, rows):  # type: ignore[no-untyped-def]
     """Whitened rows of one move δ_k = Φ δ_{k-1} - J⁻¹ e + w; returns its cost, negative if Q is singular."""
     p, d = len(moving), len(e)
@@ -111,7 +120,7 @@ def write_motion(phi, q, e, inverse, row, moving, static, lower, block, rows):  
     return cost
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def write_prior(cov, e, inverse, moving, static, lower, block, rows):  # type: ignore[no-untyped-def]
     """Whitened rows of the prior, all directions; returns its cost."""
     d, p = len(e), len(moving)
@@ -136,37 +145,41 @@ def write_prior(cov, e, inverse, moving, static, lower, block, rows):  # type: i
     return cost
 
 
-@njit(RESULT(MODEL, SCHEDULE, f1, f2, f2, i1, i1, ROWS), cache=True, error_model="numpy")
-def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, static, rows):  # type: ignore[no-untyped-def]
-    """Fill `rows`; returns (cost, -1 or the node whose process noise is singular)."""
+@bare
+def linearise_nodes(
+    model,
+    plan,
+    prior,
+    trajectory,
+    states,
+    moving,
+    static,
+    belief,
+    x,
+    q,
+    frames,
+    e,
+    work,
+    update,
+    rows,
+):
+    """The loop of `linearise_chain`, with every array at hand."""
     n, d, blocks = model.n, model.d, len(model.table)
-    nodes, widest = len(plan.reading_ptr) - 1, plan.z.shape[1]
-    belief = np.empty(n + d * d)
-    x, q = belief[:n], belief[n:].reshape((d, d))
-    phi, turn, inverse, e = np.empty((d, d)), np.empty((d, d)), np.empty((d, d)), np.empty(d)
-    work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
-    lower, block = np.empty((d, d)), np.empty((d, 4 * d + 2))
-    update = (
-        np.empty((widest, d)), np.empty(widest * d), np.zeros((widest, widest)), np.empty(widest),
-        np.empty(widest), np.empty((widest, 1)),
-    )  # fmt: skip
-    states = trajectory.reshape(-1)
+    phi, turn, inverse, lower, block = frames
     cost = 0.0
-    for node in range(nodes):
+    for node in range(len(plan.reading_ptr) - 1):
         row = rows.first[node]
         if node == 0:
-            x[:] = prior_mean
-            q[:, :] = prior_cov
+            copy_vector(prior[0], x)
+            copy_matrix(prior[1], q)
             transport(model.table, blocks, d, x, 0, states, 0, e, turn, inverse)
             push_covariance(inverse, q, work[0], work[1], d)
             cost += write_prior(q, e, inverse, moving, static, lower, block, rows)
             row += d
         else:
-            x[:] = trajectory[node - 1]
-            q[:, :] = 0.0
-            phi[:, :] = 0.0
-            for i in range(d):
-                phi[i, i] = 1.0
+            copy_vector(trajectory[node - 1], x)
+            fill_diagonal(q, 0.0)
+            fill_diagonal(phi, 1.0)
             predict(model, plan, node, belief, x, q, phi, 1, work)
             transport(model.table, blocks, d, x, 0, states, node * n, e, turn, inverse)
             push_covariance(inverse, q, work[0], work[1], d)
@@ -182,6 +195,45 @@ def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, stat
     return cost, -1
 
 
+@njit(RESULT(MODEL, SCHEDULE, f1, f2, f2, i1, i1, ROWS), cache=True, error_model="numpy")
+def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, static, rows):  # type: ignore[no-untyped-def]
+    """Fill `rows`; returns (cost, -1 or the node whose process noise is singular)."""
+    n, d, widest = model.n, model.d, plan.z.shape[1]
+    belief = np.empty(n + d * d)
+    x, q = belief[:n], belief[n:].reshape((d, d))
+    frames = (
+        np.empty((d, d)),
+        np.empty((d, d)),
+        np.empty((d, d)),
+        np.empty((d, d)),
+        np.empty((d, 4 * d + 2)),
+    )
+    work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
+    update = (
+        np.empty((widest, d)), np.empty(widest * d), np.zeros((widest, widest)), np.empty(widest),
+        np.empty(widest), np.empty((widest, 1)),
+    )  # fmt: skip
+    states = trajectory.reshape(-1)
+    return linearise_nodes(
+        model, plan, (prior_mean, prior_cov), trajectory, states, moving, static, belief, x, q, frames,
+        np.empty(d), work, update, rows,
+    )  # fmt: skip
+
+
+@bare
+def walk_nodes(model, plan, trajectory, belief, x, q, phi, work, arrived, transition, noise):
+    """The loop of `walk`, with every array at hand."""
+    for node in range(len(plan.reading_ptr) - 1):
+        copy_vector(trajectory[max(node - 1, 0)], x)
+        fill_diagonal(q, 0.0)
+        fill_diagonal(phi, 1.0)
+        if node > 0:
+            predict(model, plan, node, belief, x, q, phi, 1, work)
+        copy_vector(x, arrived[node])
+        copy_matrix(phi, transition[node])
+        copy_matrix(q, noise[node])
+
+
 @njit(types.void(MODEL, SCHEDULE, f2, _f2, _f3, _f3), cache=True, error_model="numpy")
 def walk(model, plan, trajectory, arrived, transition, noise):  # type: ignore[no-untyped-def]
     """From each node's state to the next node: arrival (K, n), Φ and Q (K, d, d); entry 0 stands still."""
@@ -189,14 +241,4 @@ def walk(model, plan, trajectory, arrived, transition, noise):  # type: ignore[n
     belief = np.empty(n + d * d)
     x, q, phi = belief[:n], belief[n:].reshape((d, d)), np.empty((d, d))
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
-    for node in range(len(plan.reading_ptr) - 1):
-        x[:] = trajectory[max(node - 1, 0)]
-        q[:, :] = 0.0
-        phi[:, :] = 0.0
-        for i in range(d):
-            phi[i, i] = 1.0
-        if node > 0:
-            predict(model, plan, node, belief, x, q, phi, 1, work)
-        arrived[node] = x
-        transition[node] = phi
-        noise[node] = q
+    walk_nodes(model, plan, trajectory, belief, x, q, phi, work, arrived, transition, noise)

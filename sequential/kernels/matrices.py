@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from sequential.kernels.call import bare
 
 __all__ = [
     "add_product_nt",
     "cholesky",
+    "copy_matrix",
+    "copy_vector",
+    "fill_diagonal",
     "multiply",
     "multiply_nt",
     "push_covariance",
@@ -20,7 +23,30 @@ __all__ = [
 TINY = 1e-13  # a pivot below this share of its diagonal has been lost to rounding
 
 
-@njit(cache=True, error_model="numpy")
+@bare
+def copy_vector(a, out):
+    """out = a, without the temporary that a slice assignment may take."""
+    for i in range(len(a)):
+        out[i] = a[i]
+
+
+@bare
+def copy_matrix(a, out):
+    """out = a for matrices of a's shape."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] = a[i, j]
+
+
+@bare
+def fill_diagonal(out, value):
+    """out = value times the identity."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = value if i == j else 0.0
+
+
+@bare
 def multiply(a, b, out, n, m, p):
     """out (n, p) = a (n, m) b (m, p); zeros of a are skipped, which pays for a sparse Jacobian."""
     for i in range(n):
@@ -33,7 +59,7 @@ def multiply(a, b, out, n, m, p):
                     out[i, j] += s * b[k, j]
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def multiply_nt(a, b, out, n, m, p):
     """out (n, p) = a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
@@ -44,7 +70,7 @@ def multiply_nt(a, b, out, n, m, p):
             out[i, j] = s
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def add_product_nt(a, b, out, n, m, p):
     """out (n, p) += a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
@@ -55,7 +81,7 @@ def add_product_nt(a, b, out, n, m, p):
             out[i, j] += s
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def symmetrise(a, n):
     """a <- (a + aᵀ) / 2."""
     for i in range(n):
@@ -65,7 +91,7 @@ def symmetrise(a, n):
             a[j, i] = s
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def push_covariance(f, p, work, flipped, d):
     """p <- F p Fᵀ for symmetric p, as F (F p)ᵀ: both products skip the zeros of F."""
     multiply(f, p, work, d, d, d)
@@ -76,7 +102,7 @@ def push_covariance(f, p, work, flipped, d):
     symmetrise(p, d)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def cholesky(a, lower, n, lenient):
     """Lower factor of a; returns the number of pivots lost to rounding.
 
@@ -108,7 +134,7 @@ def cholesky(a, lower, n, lenient):
     return lost
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def solve_lower(lower, b, n, p):
     """b (n, p) <- L⁻¹ b; rows of lost pivots become zero."""
     for i in range(n):
@@ -121,7 +147,7 @@ def solve_lower(lower, b, n, p):
             b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def solve_lower_transposed(lower, b, n, p):
     """b (n, p) <- L⁻ᵀ b; rows of lost pivots become zero."""
     for i in range(n - 1, -1, -1):

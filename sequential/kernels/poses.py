@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
+from sequential.kernels.call import allocating, bare
 from sequential.models.rotation import right_jacobian
 
 __all__ = [
@@ -27,7 +27,7 @@ SMALL = 1e-4  # rad: the series below are exact to 1e-16 there
 SERIES = 30  # terms: π³⁰/30! is 1e-18
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def se2_exp(x, y, angle):
     """Translation of Exp(x, y, angle) (Solà et al. 2018, eq. 156-158)."""
     if abs(angle) < SMALL:
@@ -39,7 +39,7 @@ def se2_exp(x, y, angle):
     return a * x - b * y, b * x + a * y
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def se2_log(x, y, angle):
     """Translational tangent of the pose (x, y, angle)."""
     half = 0.5 * angle
@@ -47,7 +47,7 @@ def se2_log(x, y, angle):
     return a * x + half * y, a * y - half * x
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def se2_adjoint_inverse(x, y, angle, out, at):
     """Ad(Exp(x, y, angle)⁻¹) into out[at:at+3, at:at+3]."""
     dx, dy = se2_exp(-x, -y, -angle)
@@ -57,7 +57,7 @@ def se2_adjoint_inverse(x, y, angle, out, at):
     out[at + 2, at], out[at + 2, at + 1], out[at + 2, at + 2] = 0.0, 0.0, 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def se2_right_jacobian(x, y, angle, out, at):
     """Right Jacobian of SE(2) into out[at:at+3, at:at+3] (Solà et al. 2018, eq. 163)."""
     if abs(angle) < SMALL:
@@ -75,7 +75,7 @@ def se2_right_jacobian(x, y, angle, out, at):
     out[at + 2, at], out[at + 2, at + 1], out[at + 2, at + 2] = 0.0, 0.0, 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def so3_local(w, x, y, z, a, b, c, d):
     """Rotation vector of conj(w, x, y, z) ⊗ (a, b, c, d), at most π long."""
     p = w * a + x * b + y * c + z * d
@@ -93,7 +93,7 @@ def so3_local(w, x, y, z, a, b, c, d):
     return scale * q, scale * r, scale * s
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def se3_exp(a, b, c, x, y, z):
     """Translation V(ω) v of Exp(ω, v): V is the left Jacobian of SO(3)."""
     j = right_jacobian(-a, -b, -c)
@@ -104,7 +104,7 @@ def se3_exp(a, b, c, x, y, z):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def se3_local(a, b, c, x, y, z):
     """V(ω)⁻¹ p = p - ω × p / 2 + k ω × (ω × p)."""
     square = a * a + b * b + c * c
@@ -121,7 +121,7 @@ def se3_local(a, b, c, x, y, z):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def se3_transport(e, t, turn, inverse):
     """Ad(Exp(e)⁻¹) and Jr(e) of SE(3) into the blocks at t: series of -ad(e) (Barfoot 2017, 7.36, 7.86)."""
     ad = np.zeros((6, 6))
@@ -143,7 +143,7 @@ def se3_transport(e, t, turn, inverse):
                 inverse[t + i, t + j] += power[i, j] / (factorial * (term + 1))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def skew_into(out, row, column, x, y, z):
     """Cross-product matrix of (x, y, z) into a 3 x 3 block."""
     out[row, column + 1], out[row, column + 2] = -z, y
@@ -151,7 +151,7 @@ def skew_into(out, row, column, x, y, z):
     out[row + 2, column], out[row + 2, column + 1] = -y, x
 
 
-@njit(cache=True, error_model="numpy")
+@allocating
 def times(power, ad):
     """-power ad, 6 x 6, without a BLAS (which takes tens of seconds to compile against)."""
     out = np.zeros((6, 6))

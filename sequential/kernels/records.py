@@ -48,4 +48,4 @@ MODEL = types.NamedTuple(
     [i2, _int, _int, _int, _int, _int, _int, _int, f1, i1, i1, f1, i1, i2, i1, i1, i1, f3, f1, i1, f1],
     ModelTables,
 )
-SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2], Schedule)
+SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2, f1], Schedule)

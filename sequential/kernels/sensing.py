@@ -1,13 +1,17 @@
-"""What filters and smoothers share: one step of the process, one look through a sensor."""
+"""What filters and smoothers share: one step of the process, one look through a sensor.
+
+Functions that take the records of a model or a plan are inlined by force: handing such a record to a real
+call counts a reference for each of its arrays, 250 ns in all.  What allocates stays outside for the same
+reason, since it would keep those counts alive.
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numba import njit
 
-from sequential.kernels.call import call
+from sequential.kernels.call import allocating, bare, call
 from sequential.kernels.charts import local, retract
 
 __all__ = ["loss_weight", "measure", "process_jacobian", "sensor_jacobian"]
@@ -16,14 +20,10 @@ STEP = 1e-6  # of central differences, in the units of the tangent
 CAUCHY = 2
 
 
-@njit(cache=True, error_model="numpy")
-def process_jacobian(model, x, u, row, dt, after, out):
-    """F (d, d) of the step from x, declared or differenced; `after` is the state after the step."""
-    width = u.shape[1]
-    if model.jacobian != 0:
-        call(model.jacobian, x, 0, u, row * width, dt, model.params, 0, out, 0)
-        return
-    d, blocks = model.d, len(model.table)
+@allocating
+def difference_process(model, x, u, row, dt, after, out):
+    """F (d, d) of the step by central differences; `after` is the state after the step."""
+    d, blocks, width = model.d, len(model.table), u.shape[1]
     xi, ahead, moved = np.zeros(d), np.empty(model.n), np.empty(model.n)
     gone, came = np.empty(d), np.empty(d)
     for j in range(d):
@@ -40,34 +40,33 @@ def process_jacobian(model, x, u, row, dt, after, out):
             out[i, j] = (gone[i] - came[i]) / (2.0 * STEP)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
+def process_jacobian(model, x, u, row, dt, after, out):
+    """F (d, d) of the step from x, declared or differenced; `after` is the state after the step."""
+    if model.jacobian != 0:
+        call(model.jacobian, x, 0, u, row * u.shape[1], dt, model.params, 0, out, 0)
+    else:
+        difference_process(model, x, u, row, dt, after, out)
+
+
+@bare
 def measure(model, plan, reading, x, x_at, expected, residual):
     """Expected measurement at x, and residual = local(expected, z)."""
     s = plan.sensor[reading]
-    width, size = plan.context.shape[1], plan.z.shape[1]
+    z_at = reading * plan.z.shape[1]
     call(
-        model.observe[s], x, x_at, plan.context, reading * width, 0.0,
+        model.observe[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
         model.sensor_params, model.sensor_params_at[s], expected, 0,
     )  # fmt: skip
-    z = plan.z.reshape(-1)
-    local(model.z_table, model.z_first[s], model.z_first[s + 1], expected, 0, z, reading * size, residual, 0)
+    local(model.z_table, model.z_first[s], model.z_first[s + 1], expected, 0, plan.z_flat, z_at, residual, 0)
 
 
-@njit(cache=True, error_model="numpy")
-def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
-    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` holds m·d numbers."""
+@allocating
+def difference_sensor(model, plan, reading, x, x_at, expected, out):
+    """H (m, d) at x by central differences about the expected measurement."""
     s = plan.sensor[reading]
     m, d, width = model.z_dim[s], model.d, plan.context.shape[1]
     at = model.sensor_params_at[s]
-    if model.observe_jacobian[s] != 0:
-        call(
-            model.observe_jacobian[s], x, x_at, plan.context, reading * width, 0.0,
-            model.sensor_params, at, flat, 0,
-        )  # fmt: skip
-        for i in range(m):
-            for j in range(d):
-                out[i, j] = flat[i * d + j]
-        return
     blocks, first, last = len(model.table), model.z_first[s], model.z_first[s + 1]
     xi, moved, seen = np.zeros(d), np.empty(model.n), np.empty(model.z_size[s])
     gone, came = np.empty(m), np.empty(m)
@@ -85,7 +84,23 @@ def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
             out[i, j] = (gone[i] - came[i]) / (2.0 * STEP)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
+def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
+    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` holds m·d numbers."""
+    s = plan.sensor[reading]
+    if model.observe_jacobian[s] == 0:
+        difference_sensor(model, plan, reading, x, x_at, expected, out)
+        return
+    call(
+        model.observe_jacobian[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
+        model.sensor_params, model.sensor_params_at[s], flat, 0,
+    )  # fmt: skip
+    for i in range(model.z_dim[s]):
+        for j in range(model.d):
+            out[i, j] = flat[i * model.d + j]
+
+
+@bare
 def loss_weight(kind, k, squared):
     """Weight of a residual whose whitened squared norm is given; 1 without a loss."""
     if kind == 0:
