@@ -52,7 +52,7 @@ bench: $(VENV)/installed-test warm
 
 # Every kernel is compiled once per machine; doing it here keeps the wait out of the first real run.
 warm: | $(VENV)/installed
-	@$(BIN)/python -m sequential.compile
+	@$(BIN)/python -m sequential.warm_up
 
 $(VENV)/bin/python:
 	@echo "creating $(VENV)"

@@ -20,7 +20,7 @@ from sequential.errors import ModelError
 from sequential.model import Functions, Plain, StateSpace, evaluate
 from sequential.timeline import sealed
 
-__all__ = ["Compiled", "compiled", "warm_up"]
+__all__ = ["Compiled", "built_in", "compiled"]
 
 Array = NDArray[np.float64]
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -123,7 +123,7 @@ def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: 
     if raw is None:
         return 0
     if not isinstance(raw, Plain):
-        return int(_built_in(raw, functions.helpers).address)
+        return int(built_in(raw, functions.helpers).address)
     made = _compiled_or_none(raw, sizes[0], sizes[1]) if isinstance(raw.function, Hashable) else None
     if made is None:
         whole.interpreted.append(name)
@@ -135,7 +135,8 @@ def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: 
 
 
 @cache
-def _built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) -> Any:
+def built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) -> Any:
+    """A model function in the kernels' calling convention, as a C function from the disk cache."""
     from numba import cfunc
     from numba.extending import register_jitable
 
@@ -156,16 +157,18 @@ def _compiled_or_none(raw: Plain, n: int, inputs: int) -> Any:
 
 
 def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:
-    """A user's function as a C function: arguments become arrays (copies, so that it may write to them)."""
+    """A user's function as a C function; its arguments become arrays, copied if it writes to them."""
     from numba import carray, cfunc, njit
 
     from sequential.kernels.call import MODEL_SIGNATURE
 
     inner = njit(error_model="numpy")(raw.function)
     size, adds = raw.size, raw.adds
-    arguments = {"x": f"carray(x, ({n},)).copy()", "u": f"carray(u, ({inputs},)).copy()", "dt": "dt"}
+    value, writes = try_once(raw, n, inputs)
+    own = ".copy()" if writes else ""
+    arguments = {"x": f"carray(x, ({n},)){own}", "u": f"carray(u, ({inputs},)){own}", "dt": "dt"}
     given = ", ".join(arguments[name] for name in raw.arguments)
-    kind = type(evaluate_kind(raw, n, inputs))
+    kind = type(value)
     take = "value" if kind in {float, int, np.float64} else "flat[i]"
     flat = (
         ""
@@ -181,10 +184,12 @@ def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:
     return cfunc(MODEL_SIGNATURE, error_model="numpy")(scope["wrapper"])
 
 
-def evaluate_kind(raw: Plain, n: int, inputs: int) -> Any:
-    """One value of a user's function, to see whether it returns an array, a list or a number."""
-    known = {"x": np.full(n, 0.5), "u": np.zeros(max(inputs, 1)), "dt": 0.01}
-    return raw.function(*(known[name] for name in raw.arguments))
+def try_once(raw: Plain, n: int, inputs: int) -> tuple[Any, bool]:
+    """One value of a user's function, and whether it wrote to its arguments on the way."""
+    known: dict[str, Any] = {"x": np.full(n, 0.5), "u": np.zeros(max(inputs, 1)), "dt": 0.01}
+    value = raw.function(*(known[name] for name in raw.arguments))
+    aliased = isinstance(value, np.ndarray) and any(np.shares_memory(value, known[a]) for a in ("x", "u"))
+    return value, aliased or bool((known["x"] != 0.5).any() or known["u"].any())
 
 
 def _interpret(whole: Compiled, raw: Plain, sizes: tuple[int, int, int]) -> Any:
@@ -203,29 +208,3 @@ def _interpret(whole: Compiled, raw: Plain, sizes: tuple[int, int, int]) -> Any:
         view[:] = view + value if raw.adds else value
 
     return CALLBACK(callback)
-
-
-def warm_up(progress: Callable[[str], None] = lambda _: None) -> None:
-    """Compile every kernel and every built-in model, so that first runs are quick."""
-    import importlib
-
-    for name in ("extended", "smoothing", "iterated", "unscented", "looking", "linearize"):
-        progress(f"kernel {name}")
-        importlib.import_module(f"sequential.kernels.{name}")
-    for name in ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared"):
-        progress(f"model {name}")
-        module = importlib.import_module(f"sequential.models.{name}")
-        for function in vars(module).values():
-            if _is_raw(function) and function.__module__ == module.__name__:
-                _built_in(function, getattr(module, "HELPERS", ()))
-
-
-def _is_raw(function: Any) -> bool:
-    code = getattr(function, "__code__", None)
-    return code is not None and code.co_varnames[: code.co_argcount] == ("x", "u", "dt", "p", "out")
-
-
-if __name__ == "__main__":
-    import sys
-
-    warm_up(lambda what: print(f"compiling {what}", file=sys.stderr, flush=True))

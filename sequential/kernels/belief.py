@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from sequential.kernels.call import bare
+from numba import types
+
+from sequential.kernels.arrays import f0, f1, f2, i0, w2
+from sequential.kernels.call import bare_as
 from sequential.kernels.matrices import (
     add_product_nt,
     cholesky,
@@ -17,10 +20,11 @@ from sequential.kernels.matrices import (
 
 __all__ = ["LOG_TWO_PI", "gain_and_innovation", "joseph"]
 
+PAIR = types.Tuple([f0, f0])
 LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
-@bare
+@bare_as(PAIR(f2, f2, f2, f0, f1, i0, i0, w2, w2, w2, w2))
 def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):
     """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹; returns (NIS, log det S), NIS negative if S is not positive definite.
 
@@ -51,7 +55,7 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
     return nis, log_det
 
 
-@bare
+@bare_as(types.void(w2, f2, f2, f2, f0, i0, i0, w2, w2, w2))
 def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):
     """P <- (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; symmetric for any gain."""
     for i in range(d):

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 
+from numba import types
 from numba.extending import register_jitable
 
-from sequential.kernels.call import bare
+from sequential.kernels.arrays import f0, f1, i0, i2, w1, w2
+from sequential.kernels.call import bare, bare_as
 from sequential.kernels.poses import (
     se2_adjoint_inverse,
     se2_exp,
@@ -31,13 +33,13 @@ for helper in (rotation, quaternion_exp, quaternion_product, right_jacobian):
 VECTOR, SO2, SO3, SE2, SE3, NAV = range(6)
 
 
-@bare
+@bare_as(f0(f0))
 def wrap(angle):
     """Angle in ]-π, π]."""
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
-@bare
+@bare_as(types.void(i2, i0, i0, f1, i0, f1, i0, w1, i0))
 def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):
     """out = x ⊕ xi over the blocks first:last, arrays flat from their offsets; out may be x."""
     for b in range(first, last):
@@ -76,7 +78,7 @@ def retract(table, first, last, x, x_at, xi, xi_at, out, out_at):
                         out[o + 1 + at + i] = x[s + 1 + at + i] + turned
 
 
-@bare
+@bare_as(types.void(i2, i0, i0, f1, i0, f1, i0, w1, i0))
 def local(table, first, last, x, x_at, y, y_at, out, out_at):
     """out = the tangent vector at x that leads to y."""
     for b in range(first, last):
@@ -113,6 +115,21 @@ def local(table, first, last, x, x_at, y, y_at, out, out_at):
 
 
 @bare
+def nav_transport(a, e, t, turn, inverse):
+    """Position and velocity blocks: Aᵀ, and -Aᵀ [e]x from the rotation, with Aᵀ given row by row."""
+    for at in (3, 6):
+        p, q, r = e[t + at], e[t + at + 1], e[t + at + 2]
+        for i in range(3):
+            u, v, w = a[3 * i], a[3 * i + 1], a[3 * i + 2]
+            turn[t + at + i, t] = -(v * r - w * q)
+            turn[t + at + i, t + 1] = -(w * p - u * r)
+            turn[t + at + i, t + 2] = -(u * q - v * p)
+            for k in range(3):
+                turn[t + at + i, t + at + k] = a[3 * i + k]
+                inverse[t + at + i, t + at + k] = a[3 * i + k]
+
+
+@bare_as(types.void(i2, i0, i0, f1, i0, f1, i0, w1, w2, w2))
 def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):
     """Linearise e = local(x, y): `inverse` = (∂e/∂y)⁻¹ and `turn` = -(∂e/∂y)⁻¹ ∂e/∂x, both (d, d)."""
     local(table, 0, blocks, x, x_at, y, y_at, e, 0)
@@ -141,18 +158,3 @@ def transport(table, blocks, d, x, x_at, y, y_at, e, turn, inverse):
                 se3_transport(e, t, turn, inverse)
             elif kind == NAV:
                 nav_transport(a, e, t, turn, inverse)
-
-
-@bare
-def nav_transport(a, e, t, turn, inverse):
-    """Position and velocity blocks: Aᵀ, and -Aᵀ [e]x from the rotation, with Aᵀ given row by row."""
-    for at in (3, 6):
-        p, q, r = e[t + at], e[t + at + 1], e[t + at + 2]
-        for i in range(3):
-            u, v, w = a[3 * i], a[3 * i + 1], a[3 * i + 2]
-            turn[t + at + i, t] = -(v * r - w * q)
-            turn[t + at + i, t + 1] = -(w * p - u * r)
-            turn[t + at + i, t + 2] = -(u * q - v * p)
-            for k in range(3):
-                turn[t + at + i, t + at + k] = a[3 * i + k]
-                inverse[t + at + i, t + at + k] = a[3 * i + k]

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
+from sequential.kernels.arrays import f1, f2
 from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
 from sequential.kernels.call import allocating, bare, call
 from sequential.kernels.charts import retract, transport
 from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply, push_covariance
-from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
+from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, process_jacobian, sensor_jacobian
 
 __all__ = ["FILTERED", "Filtered", "filter_log"]

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
+from sequential.kernels.arrays import f0, f1, f2, i0, w2
 from sequential.kernels.belief import gain_and_innovation, joseph
-from sequential.kernels.call import bare
+from sequential.kernels.call import bare, bare_as
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
 from sequential.kernels.matrices import (
@@ -24,7 +25,7 @@ from sequential.kernels.matrices import (
     multiply_nt,
     push_covariance,
 )
-from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
+from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
 
 __all__ = ["LINEARISED", "Linearised", "filter_steps"]
@@ -71,7 +72,7 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     return 0
 
 
-@bare
+@bare_as(f0(f2, f1, i0, w2, w2))
 def whitened_square(noise, residual, m, lower, white):
     """Residualᵀ R⁻¹ residual by forward substitution; `white` (m, 1 or more) is scratch."""
     total = 0.0

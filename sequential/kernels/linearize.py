@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
+from sequential.kernels.arrays import f1, f2, i1
 from sequential.kernels.call import bare
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
@@ -24,7 +25,7 @@ from sequential.kernels.matrices import (
     push_covariance,
     solve_lower,
 )
-from sequential.kernels.records import MODEL, SCHEDULE, f1, f2, i1
+from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
 
 __all__ = ["ROWS", "Rows", "linearise_chain", "walk"]
@@ -86,15 +87,14 @@ def write_reading(model, plan, reading, states, at, row, moving, static, update,
 
 
 @bare
-def write_motion(phi, q, e, inverse, row, moving, static, lower, block, rows):  # type: ignore[no-untyped-def]
+def write_motion(phi, q, e, inverse, row, moving, static, lower, block, square, rows):  # type: ignore[no-untyped-def]
     """Whitened rows of one move δ_k = Φ δ_{k-1} - J⁻¹ e + w; returns its cost, negative if Q is singular."""
     p, d = len(moving), len(e)
     width = 2 * p + len(static) + 1
     for i in range(p):
         for j in range(p):
-            lower[i, j] = 0.0
-            block[i, width + j] = q[moving[i], moving[j]]
-    if cholesky(block[:, width:], lower, p, False) > 0:
+            square[i, j] = q[moving[i], moving[j]]
+    if cholesky(square, lower, p, False) > 0:
         return -1.0
     for i in range(p):
         a = moving[i]
@@ -184,7 +184,7 @@ def linearise_nodes(
             transport(model.table, blocks, d, x, 0, states, node * n, e, turn, inverse)
             push_covariance(inverse, q, work[0], work[1], d)
             multiply(turn, phi, work[0], d, d, d)
-            moved = write_motion(work[0], q, e, inverse, row, moving, static, lower, block, rows)
+            moved = write_motion(work[0], q, e, inverse, row, moving, static, lower, block, work[1], rows)
             if moved < 0.0:
                 return cost, node
             cost += moved
@@ -206,7 +206,7 @@ def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, stat
         np.empty((d, d)),
         np.empty((d, d)),
         np.empty((d, d)),
-        np.empty((d, 4 * d + 2)),
+        np.empty((d, 2 * d + 1)),
     )
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
     update = (

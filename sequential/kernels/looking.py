@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
-from sequential.kernels.records import MODEL, SCHEDULE, f2, i1
+from sequential.kernels.arrays import f2, i1
+from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import measure, sensor_jacobian
 
 __all__ = ["look_at_readings"]

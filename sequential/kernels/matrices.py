@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from sequential.kernels.call import bare
+from numba import types
+
+from sequential.kernels.arrays import b0, f0, f1, f2, i0, w1, w2
+from sequential.kernels.call import bare_as
 
 __all__ = [
     "add_product_nt",
@@ -23,14 +26,14 @@ __all__ = [
 TINY = 1e-13  # a pivot below this share of its diagonal has been lost to rounding
 
 
-@bare
+@bare_as(types.void(f1, w1))
 def copy_vector(a, out):
     """out = a, without the temporary that a slice assignment may take."""
     for i in range(len(a)):
         out[i] = a[i]
 
 
-@bare
+@bare_as(types.void(f2, w2))
 def copy_matrix(a, out):
     """out = a for matrices of a's shape."""
     for i in range(a.shape[0]):
@@ -38,7 +41,7 @@ def copy_matrix(a, out):
             out[i, j] = a[i, j]
 
 
-@bare
+@bare_as(types.void(w2, f0))
 def fill_diagonal(out, value):
     """out = value times the identity."""
     for i in range(out.shape[0]):
@@ -46,7 +49,7 @@ def fill_diagonal(out, value):
             out[i, j] = value if i == j else 0.0
 
 
-@bare
+@bare_as(types.void(f2, f2, w2, i0, i0, i0))
 def multiply(a, b, out, n, m, p):
     """out (n, p) = a (n, m) b (m, p); zeros of a are skipped, which pays for a sparse Jacobian."""
     for i in range(n):
@@ -59,7 +62,7 @@ def multiply(a, b, out, n, m, p):
                     out[i, j] += s * b[k, j]
 
 
-@bare
+@bare_as(types.void(f2, f2, w2, i0, i0, i0))
 def multiply_nt(a, b, out, n, m, p):
     """out (n, p) = a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
@@ -70,7 +73,7 @@ def multiply_nt(a, b, out, n, m, p):
             out[i, j] = s
 
 
-@bare
+@bare_as(types.void(f2, f2, w2, i0, i0, i0))
 def add_product_nt(a, b, out, n, m, p):
     """out (n, p) += a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
@@ -81,7 +84,7 @@ def add_product_nt(a, b, out, n, m, p):
             out[i, j] += s
 
 
-@bare
+@bare_as(types.void(w2, i0))
 def symmetrise(a, n):
     """a <- (a + aᵀ) / 2."""
     for i in range(n):
@@ -91,7 +94,7 @@ def symmetrise(a, n):
             a[j, i] = s
 
 
-@bare
+@bare_as(types.void(f2, w2, w2, w2, i0))
 def push_covariance(f, p, work, flipped, d):
     """p <- F p Fᵀ for symmetric p, as F (F p)ᵀ: both products skip the zeros of F."""
     multiply(f, p, work, d, d, d)
@@ -102,7 +105,7 @@ def push_covariance(f, p, work, flipped, d):
     symmetrise(p, d)
 
 
-@bare
+@bare_as(i0(f2, w2, i0, b0))
 def cholesky(a, lower, n, lenient):
     """Lower factor of a; returns the number of pivots lost to rounding.
 
@@ -134,7 +137,7 @@ def cholesky(a, lower, n, lenient):
     return lost
 
 
-@bare
+@bare_as(types.void(f2, w2, i0, i0))
 def solve_lower(lower, b, n, p):
     """b (n, p) <- L⁻¹ b; rows of lost pivots become zero."""
     for i in range(n):
@@ -147,7 +150,7 @@ def solve_lower(lower, b, n, p):
             b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0
 
 
-@bare
+@bare_as(types.void(f2, w2, i0, i0))
 def solve_lower_transposed(lower, b, n, p):
     """b (n, p) <- L⁻ᵀ b; rows of lost pivots become zero."""
     for i in range(n - 1, -1, -1):

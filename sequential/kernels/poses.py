@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 from numba.extending import register_jitable
 
-from sequential.kernels.call import allocating, bare
+from sequential.kernels.arrays import f0, i0, w2
+from sequential.kernels.call import allocating, bare, bare_as
 from sequential.models.rotation import right_jacobian
 
 __all__ = [
@@ -47,7 +49,7 @@ def se2_log(x, y, angle):
     return a * x + half * y, a * y - half * x
 
 
-@bare
+@bare_as(types.void(f0, f0, f0, w2, i0))
 def se2_adjoint_inverse(x, y, angle, out, at):
     """Ad(Exp(x, y, angle)⁻¹) into out[at:at+3, at:at+3]."""
     dx, dy = se2_exp(-x, -y, -angle)
@@ -57,7 +59,7 @@ def se2_adjoint_inverse(x, y, angle, out, at):
     out[at + 2, at], out[at + 2, at + 1], out[at + 2, at + 2] = 0.0, 0.0, 1.0
 
 
-@bare
+@bare_as(types.void(f0, f0, f0, w2, i0))
 def se2_right_jacobian(x, y, angle, out, at):
     """Right Jacobian of SE(2) into out[at:at+3, at:at+3] (Solà et al. 2018, eq. 163)."""
     if abs(angle) < SMALL:

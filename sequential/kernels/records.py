@@ -6,15 +6,10 @@ from typing import Any, NamedTuple
 
 from numba import types
 
+from sequential.kernels.arrays import f1, f2, f3, i1, i2
 from sequential.timeline import Schedule
 
-__all__ = ["MODEL", "SCHEDULE", "ModelTables", "f1", "f2", "f3", "i1"]
-
-f1 = types.Array(types.float64, 1, "C", readonly=True)
-f2 = types.Array(types.float64, 2, "C", readonly=True)
-f3 = types.Array(types.float64, 3, "C", readonly=True)
-i1 = types.Array(types.int64, 1, "C", readonly=True)
-i2 = types.Array(types.int64, 2, "C", readonly=True)
+__all__ = ["MODEL", "SCHEDULE", "ModelTables"]
 
 
 class ModelTables(NamedTuple):

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from sequential.kernels.call import allocating, bare, call
+from sequential.kernels.arrays import f0, i0
+from sequential.kernels.call import allocating, bare, bare_as, call
 from sequential.kernels.charts import local, retract
 
 __all__ = ["loss_weight", "measure", "process_jacobian", "sensor_jacobian"]
@@ -100,7 +101,7 @@ def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
             out[i, j] = flat[i * model.d + j]
 
 
-@bare
+@bare_as(f0(i0, f0, f0))
 def loss_weight(kind, k, squared):
     """Weight of a residual whose whitened squared norm is given; 1 without a loss."""
     if kind == 0:

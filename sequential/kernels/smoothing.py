@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
+from sequential.kernels.arrays import f2, f3, i2
 from sequential.kernels.charts import local, retract
 from sequential.kernels.matrices import (
     cholesky,
@@ -14,7 +15,6 @@ from sequential.kernels.matrices import (
     solve_lower_transposed,
     symmetrise,
 )
-from sequential.kernels.records import f2, f3, i2
 
 __all__ = ["smooth_history"]
 

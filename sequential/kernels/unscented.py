@@ -15,12 +15,13 @@ import math
 import numpy as np
 from numba import njit, types
 
+from sequential.kernels.arrays import f1, f2
 from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
 from sequential.kernels.call import call
 from sequential.kernels.charts import local, retract
 from sequential.kernels.extended import FILTERED, FINISHED
 from sequential.kernels.matrices import multiply
-from sequential.kernels.records import MODEL, SCHEDULE, f1, f2
+from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight
 
 __all__ = ["filter_sigma_points"]

@@ -1,0 +1,61 @@
+"""Compile every kernel and built-in model once, so that first runs are quick: `python -m sequential.warm_up`.
+
+Two processes share the work, each writing to the same disk cache; what is cached already costs a second.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import Any
+
+__all__ = ["warm_up"]
+
+# Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
+SMALL = ("matrices", "poses", "charts", "belief", "sensing")
+KERNELS = ("extended", "unscented", "iterated", "linearize", "smoothing", "looking")
+MODELS = ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared")
+
+
+def warm_up(progress: Callable[[str], None] = lambda _: None) -> None:
+    """Compile whatever is not in the cache yet; `progress` hears what has just been made."""
+    for name in SMALL:
+        importlib.import_module(f"sequential.kernels.{name}")
+    progress("small matrices and charts")
+    workers = max(1, min(len(os.sched_getaffinity(0)), len(KERNELS)))
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        jobs = {pool.submit(compile_kernel, name): f"kernel {name}" for name in KERNELS}
+        jobs |= {pool.submit(compile_models, name): f"models {name}" for name in MODELS}
+        for job in as_completed(jobs):
+            job.result()
+            progress(jobs[job])
+
+
+def compile_kernel(name: str) -> None:
+    """Import one kernel, which compiles it."""
+    importlib.import_module(f"sequential.kernels.{name}")
+
+
+def compile_models(name: str) -> None:
+    """Compile the functions of one room of models."""
+    from sequential.compile import built_in
+
+    module = importlib.import_module(f"sequential.models.{name}")
+    for function in vars(module).values():
+        if is_raw(function) and function.__module__ == module.__name__:
+            built_in(function, getattr(module, "HELPERS", ()))
+
+
+def is_raw(function: Any) -> bool:
+    """Whether something is a model function in the kernels' calling convention."""
+    code = getattr(function, "__code__", None)
+    return code is not None and code.co_varnames[: code.co_argcount] == ("x", "u", "dt", "p", "out")
+
+
+if __name__ == "__main__":
+    import sys
+
+    warm_up(lambda what: print(f"compiled {what}", file=sys.stderr, flush=True))
