@@ -4,8 +4,8 @@ Leung, Halpern, Barfoot, Liu, "The UTIAS multi-robot cooperative localization an
 
 What the recording calls range is the distance *along the camera's axis* (a barcode's height in pixels says
 how deep it is, not how far), so it is divided by the cosine of the bearing here, at the door.  Innovations
-say so without the truth: the log likelihood gains 480 and 1250 for the two robots.  What is left, a scale of
-a few per cent in range, wheel speed and turn rate, and where the camera sits, are states that do not move.
+say so without the truth: their log likelihood gains 2 500 and 9 600 for the two robots.  What is left, a few
+per cent in range, wheel speed and turn rate, and where the camera sits, are states that do not move.
 """
 
 from __future__ import annotations
