@@ -110,6 +110,8 @@ def compare_and_show(settings: Settings) -> int:
                 )
             )
     done = tuple(comparisons)
+    if all(comparison.all_failed for comparison in done):
+        return _say_why(done)
     whole = document(done, _command())
     _print(done, whole, as_json=settings.as_json)
     if settings.out is not None:
@@ -190,10 +192,13 @@ def _command() -> str:
     return shlex.join(["factorlab", *sys.argv[1:]])
 
 
+def _say_why(comparisons: tuple[Comparison, ...]) -> int:
+    """No estimator succeeded: the reasons in one sentence."""
+    reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)
+    click.echo(f"error: no estimator succeeded: {'; '.join(reasons)}", err=True)
+    return DATA_ERROR
+
+
 def _exit_code(comparisons: tuple[Comparison, ...], *, check: bool) -> int:
-    if all(comparison.all_failed for comparison in comparisons):
-        reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)
-        click.echo(f"error: no estimator succeeded: {'; '.join(reasons)}", err=True)
-        return DATA_ERROR
     failed = any(finding.status == "FAIL" for comparison in comparisons for finding in comparison.findings)
     return CHECK_FAILED if check and failed else 0

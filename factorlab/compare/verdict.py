@@ -76,13 +76,18 @@ def _diagnosis(problem: Problem, row: Row) -> list[Finding]:
     """What the innovations say, in the words of `sequential.evaluate.diagnose`."""
     assert row.run is not None  # noqa: S101 - only solved rows are diagnosed
     found = []
-    for one in diagnose(row.run, problem.model, _guilty(problem, row)):
+    told = diagnose(row.run, problem.model, _guilty(problem, row))
+    levels_fail = any(one.metric == "mean NIS" and one.level == "FAIL" for one in told)
+    for one in told:
         if one.metric == "solve":
             continue  # told already
         of = f" of {one.sensor}" if one.sensor and one.sensor not in one.metric else ""
         metric = f"{row.title}: {one.metric}{of}"
+        # a factor that the likelihood is sure of, while the innovations fit, is worth a warning
+        mild = one.metric == "noise balance" and one.level == "FAIL" and not levels_fail
+        level: Status = "WARN" if mild else one.level
         found.append(
-            Finding(metric, one.value, one.band, one.level, one.meaning, one.advice, row.name, one.sensor)
+            Finding(metric, one.value, one.band, level, one.meaning, one.advice, row.name, one.sensor)
         )
     return found
 
