@@ -20,7 +20,7 @@ KERNELS = ("extended", "unscented", "iterated", "linearize", "smoothing", "looki
 MODELS = ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared")
 
 
-def warm_up(progress: Callable[[str], None] = lambda _: None) -> None:
+def warm_up(progress: Callable[[str], object] = lambda _: None) -> None:
     """Compile whatever is not in the cache yet; `progress` hears what has just been made."""
     for name in SMALL:
         importlib.import_module(f"sequential.kernels.{name}")
@@ -58,4 +58,4 @@ def is_raw(function: Any) -> bool:
 if __name__ == "__main__":
     import sys
 
-    warm_up(lambda what: print(f"compiled {what}", file=sys.stderr, flush=True))
+    warm_up(lambda what: sys.stderr.write(f"compiled {what}\n"))

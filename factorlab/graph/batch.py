@@ -60,7 +60,9 @@ class BatchGraph:
         run = self._native(problem, native, start.mean) if native else self._batched(problem, start.mean)
         details = {**run.report.details, "start_s": start.report.seconds}
         seconds = details["finished"] - began
-        report = replace(run.report, seconds=seconds, details={k: v for k, v in details.items() if k != "finished"})
+        report = replace(
+            run.report, seconds=seconds, details={k: v for k, v in details.items() if k != "finished"}
+        )
         run = replace(run, report=report, log_likelihood=start.log_likelihood)
         return replace(run, innovations=leave_one_out(problem, run)) if self.covariance else run
 
@@ -76,7 +78,14 @@ class BatchGraph:
             marginals = gtsam.Marginals(graph, solved.values)
             cov = np.stack([native.covariance(marginals, k, x) for k, x in enumerate(mean)])
         details = {"build_s": built - began, "solve_s": finished - built, "finished": finished}
-        return self._run(problem, mean, cov, solved.cost, solved.iterations, {**details, "gradient": solved.gradient})
+        return self._run(
+            problem,
+            mean,
+            cov,
+            solved.cost,
+            solved.iterations,
+            {**details, "newton_decrement": solved.decrement},
+        )
 
     def _batched(self, problem: Problem, start: Array) -> Run:
         began = time.perf_counter()
@@ -85,12 +94,20 @@ class BatchGraph:
         mean, cost, iterations, _ = chain.solve(start, self.max_iterations, self.tolerance, check=self.check)
         finished = time.perf_counter()
         d = problem.model.manifold.dim
-        cov = chain.covariances(chain.linear_graph()) if self.covariance else np.full((len(mean), d, d), np.nan)
+        cov = (
+            chain.covariances(chain.linear_graph()) if self.covariance else np.full((len(mean), d, d), np.nan)
+        )
         details = {"build_s": built - began, "solve_s": finished - built, "finished": finished}
         return self._run(problem, mean, cov, cost, iterations, details)
 
     def _run(
-        self, problem: Problem, mean: Array, cov: Array, cost: float, iterations: int, details: dict[str, float]
+        self,
+        problem: Problem,
+        mean: Array,
+        cov: Array,
+        cost: float,
+        iterations: int,
+        details: dict[str, float],
     ) -> Run:
         report = Report(self.name, iterations=iterations, cost=cost, details=details)
         return Run(problem.t, mean, cov, problem.model.manifold, {}, float("nan"), report)

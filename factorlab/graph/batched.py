@@ -51,7 +51,9 @@ class ChainGraph:
         plan, p = self.problem.schedule, len(self.moving)
         per_reading = dims[plan.sensor] if len(plan.sensor) else np.zeros(0, dtype=np.int64)
         readings = np.concatenate([[0], np.cumsum(per_reading)])[plan.reading_ptr]
-        moves = np.concatenate([[0], len(self.moving) + len(self.static) + p * np.arange(len(self.problem.t))])
+        moves = np.concatenate(
+            [[0], len(self.moving) + len(self.static) + p * np.arange(len(self.problem.t))]
+        )
         first = (moves + readings).astype(np.int64)
         total = int(first[-1])
         shapes = ((total, p), (total, p), (total, max(1, len(self.static))), (total,))
@@ -95,7 +97,9 @@ class ChainGraph:
                 fixed_part = (STATIC, fixed[a:b]) if static else ()
                 graph.push_back(make(key, here[a:b], *fixed_part, right[a:b], unit))
             elif static:
-                graph.push_back(make(keys[k - 1], before[a:b], key, here[a:b], STATIC, fixed[a:b], right[a:b], unit))
+                graph.push_back(
+                    make(keys[k - 1], before[a:b], key, here[a:b], STATIC, fixed[a:b], right[a:b], unit)
+                )
             else:
                 graph.push_back(make(keys[k - 1], before[a:b], key, here[a:b], right[a:b], unit))
         return graph
@@ -164,5 +168,3 @@ class ChainGraph:
             whole = np.block([[joint.at(a, b) for b in (key, STATIC)] for a in (key, STATIC)])
             cov[k] = whole[np.ix_(inverse, inverse)]
         return cov
-
-

@@ -69,7 +69,9 @@ class IncrementalGraph:
         """Online and final estimate of one pass."""
         native = require_native(problem, "iSAM2")
         engine = gtsam.ISAM2(isam_parameters(self.threshold))
-        mean, cov, seconds = walk(problem, native, lambda graph, values, _: engine.update(graph, values), engine)
+        mean, cov, seconds = walk(
+            problem, native, lambda graph, values, _: engine.update(graph, values), engine
+        )
         online = online_run(problem, mean, cov, "isam2", seconds)
         began = time.perf_counter()
         for _ in range(5):

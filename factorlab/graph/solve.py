@@ -15,10 +15,16 @@ from factorlab.graph.keys import name_of
 from sequential.errors import NotConvergedError, SolverError, UnderConstrainedError
 from sequential.timeline import Problem
 
-__all__ = ["Solved", "optimise", "readable", "require_full_rank"]
+__all__ = ["Solved", "newton_decrement", "optimise", "readable"]
 
-STIFF = 1e-3  # gradient per unit of (1 + cost) that still counts as settled
-WORDS = {"x": "the pose", "v": "the velocity", "b": "the IMU bias", "l": "the landmark", "s": "the static part"}
+SETTLED = 1e-3  # share of (1 + cost) that one more Gauss-Newton step may still promise
+WORDS = {
+    "x": "the pose",
+    "v": "the velocity",
+    "b": "the IMU bias",
+    "l": "the landmark",
+    "s": "the static part",
+}
 
 
 def under_constrained(text: str, problem: Problem | None) -> str:
@@ -63,16 +69,22 @@ class Solved:
     values: Any
     cost: float
     iterations: int
-    gradient: float
+    decrement: float  # what one more Gauss-Newton step promises to take off the cost
 
 
-def require_full_rank(linear: Any, problem: Problem | None = None) -> None:
-    """Raise `UnderConstrainedError` where a linear graph leaves a variable free.
+def newton_decrement(linear: Any, problem: Problem | None = None) -> float:
+    """Cost that one more Gauss-Newton step promises to take off; it does not depend on units.
 
-    Levenberg-Marquardt returns happily from such a graph, with a gauge of its own making.
+    Solving for that step also proves full rank: Levenberg-Marquardt returns happily from a graph that
+    leaves a variable free, with a gauge of its own making.
+
+    Raises
+    ------
+    UnderConstrainedError
     """
     with readable(problem):
-        linear.optimize()
+        step = linear.optimize()
+    return float(linear.error(gtsam.VectorValues.Zero(step)) - linear.error(step))
 
 
 def optimise(
@@ -100,15 +112,14 @@ def optimise(
         if not np.isfinite(cost) or cost > before:
             values, cost, iterations = damped(graph, start, max_iterations)
         linear = graph.linearize(values)
-    require_full_rank(linear, problem)
-    gradient = largest_gradient(linear)
-    if check and (iterations == 0 or gradient > STIFF * (1.0 + cost)) and iterations >= max_iterations:
+    decrement = newton_decrement(linear, problem)
+    if check and decrement > SETTLED * (1.0 + cost):
         msg = (
-            f"the solver stopped after {iterations} iterations with gradient {gradient:.3g} at cost {cost:.6g}; "
-            "raise max_iterations or mend the start"
+            f"the solver stopped after {iterations} iterations at cost {cost:.6g}, and one more step would "
+            f"take off {decrement:.3g}; raise max_iterations or mend the start"
         )
         raise NotConvergedError(msg)
-    return Solved(values, cost, iterations, gradient)
+    return Solved(values, cost, iterations, decrement)
 
 
 def damped(graph: Any, start: Any, max_iterations: int) -> tuple[Any, float, int]:
@@ -119,9 +130,3 @@ def damped(graph: Any, start: Any, max_iterations: int) -> tuple[Any, float, int
     optimizer = gtsam.LevenbergMarquardtOptimizer(graph, start, parameters)
     values = optimizer.optimize()
     return values, optimizer.error(), optimizer.iterations()
-
-
-def largest_gradient(linear: Any) -> float:
-    """Largest entry of the gradient of a linear graph at zero."""
-    gradient = linear.gradientAtZero()
-    return float(np.abs(gradient.vector()).max())

@@ -49,7 +49,7 @@ RESULT = types.Tuple([types.float64, types.int64])
 
 
 @bare
-def loss_cost(kind, k, squared):  # type: ignore[no-untyped-def]
+def loss_cost(kind, k, squared):
     """Half the squared norm, or what a robust loss makes of it."""
     if kind == 0:
         return 0.5 * squared
@@ -60,7 +60,7 @@ def loss_cost(kind, k, squared):  # type: ignore[no-untyped-def]
 
 
 @bare
-def write_reading(model, plan, reading, states, at, row, moving, static, update, rows):  # type: ignore[no-untyped-def]
+def write_reading(model, plan, reading, states, at, row, moving, static, update, rows):
     """Whitened rows of one reading; returns its cost."""
     s = plan.sensor[reading]
     m = model.z_dim[s]
@@ -87,7 +87,7 @@ def write_reading(model, plan, reading, states, at, row, moving, static, update,
 
 
 @bare
-def write_motion(phi, q, e, inverse, row, moving, static, lower, block, square, rows):  # type: ignore[no-untyped-def]
+def write_motion(phi, q, e, inverse, row, moving, static, lower, block, square, rows):
     """Whitened rows of one move δ_k = Φ δ_{k-1} - J⁻¹ e + w; returns its cost, negative if Q is singular."""
     p, d = len(moving), len(e)
     width = 2 * p + len(static) + 1
@@ -121,7 +121,7 @@ def write_motion(phi, q, e, inverse, row, moving, static, lower, block, square, 
 
 
 @bare
-def write_prior(cov, e, inverse, moving, static, lower, block, rows):  # type: ignore[no-untyped-def]
+def write_prior(cov, e, inverse, moving, static, lower, block, rows):
     """Whitened rows of the prior, all directions; returns its cost."""
     d, p = len(e), len(moving)
     cholesky(cov, lower, d, False)
@@ -196,7 +196,7 @@ def linearise_nodes(
 
 
 @njit(RESULT(MODEL, SCHEDULE, f1, f2, f2, i1, i1, ROWS), cache=True, error_model="numpy")
-def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, static, rows):  # type: ignore[no-untyped-def]
+def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, static, rows):
     """Fill `rows`; returns (cost, -1 or the node whose process noise is singular)."""
     n, d, widest = model.n, model.d, plan.z.shape[1]
     belief = np.empty(n + d * d)
@@ -235,7 +235,7 @@ def walk_nodes(model, plan, trajectory, belief, x, q, phi, work, arrived, transi
 
 
 @njit(types.void(MODEL, SCHEDULE, f2, _f2, _f3, _f3), cache=True, error_model="numpy")
-def walk(model, plan, trajectory, arrived, transition, noise):  # type: ignore[no-untyped-def]
+def walk(model, plan, trajectory, arrived, transition, noise):
     """From each node's state to the next node: arrival (K, n), Φ and Q (K, d, d); entry 0 stands still."""
     n, d = model.n, model.d
     belief = np.empty(n + d * d)
