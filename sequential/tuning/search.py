@@ -21,7 +21,8 @@ Function = Callable[[Array], float]
 START, FIRST_STEP = 1.5, -0.5  # from well above the prior's centre, downwards
 TOLERANCE, GAIN = 0.05, 0.1  # the simplex stops at this size and this difference; Newton does the rest
 STEP = 0.02  # of differences: far above rounding, far below the curvature of a prior
-SETTLED = 1e-3  # a Newton step that promises less than this is not worth the filter passes
+CLIFF = 1e300  # stands for minus infinity where differences are taken
+SETTLED = 1e-3  # a Newton step that promises less than this is the last one
 POLISHES = 3
 LONGEST = 1.0  # a Newton step is trusted over this distance
 
@@ -77,10 +78,11 @@ def climb(function: Function, dim: int, max_evaluations: int) -> Summit:
     """Maximise a function whose variables are of the order of one, centred on zero."""
     from scipy.optimize import minimize
 
-    first = np.full(dim, START)
-    simplex = np.vstack([first, first + FIRST_STEP * np.eye(dim)])
+    start = START if np.isfinite(function(np.full(dim, START))) else 0.0
+    simplex = np.full((dim + 1, dim), start)
+    simplex[1:] += FIRST_STEP * np.eye(dim)
     options = {"initial_simplex": simplex, "xatol": TOLERANCE, "fatol": GAIN, "maxfev": max_evaluations}
-    found = minimize(lambda u: -function(u), first, method="Nelder-Mead", options=options)
+    found = minimize(lambda u: min(-function(u), CLIFF), simplex[0], method="Nelder-Mead", options=options)
     message = "" if found.success else f"the simplex had not settled after {max_evaluations} evaluations"
     at = np.asarray(found.x, dtype=np.float64)
     if function(np.zeros(dim)) > function(at):
@@ -96,6 +98,7 @@ def polish(function: Function, at: Array, *, converged: bool, message: str) -> S
             break
         step = shape.newton()
         if 0.5 * float(shape.gradient @ step) < SETTLED:
+            at = at + step if function(at + step) >= function(at) else at
             return Summit(at, function(at), shape, converged=True, message="")
         step *= min(1.0, LONGEST / float(np.linalg.norm(step)))
         while function(at + step) <= function(at) and np.linalg.norm(step) > STEP:
