@@ -11,7 +11,7 @@ from factorlab.datasets import load
 
 @pytest.fixture(scope="module")
 def drive():
-    return load("kitti", use_every=5)
+    return load("kitti", use_every=5)[0]
 
 
 @pytest.fixture(scope="module", params=[1.0, 3.0, 1 / 3.0], ids=["shipped", "x3", "/3"])
