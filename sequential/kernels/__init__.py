@@ -17,6 +17,7 @@ import numba
 __all__ = ["cache_folder"]
 
 INLINED = (
+    "kernels/arrays.py",
     "kernels/belief.py",
     "kernels/call.py",
     "kernels/extended.py",
