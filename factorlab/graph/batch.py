@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.batched import ChainGraph
+from factorlab.graph.marginals import chain_marginals
 from factorlab.graph.native import NativeGraph, native_graph
-from factorlab.graph.solve import optimise
+from factorlab.graph.solve import Solved, optimise
 from sequential.errors import ModelError
 from sequential.history import Report, Run
 from sequential.smoothers import RauchTungStriebel
@@ -33,7 +34,8 @@ class BatchGraph:
     ----------
     route : `"native"` C++ factors, `"batched"` linearisation (any model), or `"auto"`: native where it can be
     covariance : also compute the marginals of every node; they are not part of the reported seconds
-    max_iterations, tolerance : of Gauss-Newton; the tolerance is the largest tangent step of the batched route
+    max_iterations : of Gauss-Newton
+    tolerance : the batched route stops at a tangent step below this
     check : raise where the solver has not settled
     """
 
@@ -73,44 +75,43 @@ class BatchGraph:
         solved = optimise(graph, values, problem, self.max_iterations, check=self.check)
         finished = time.perf_counter()
         mean = np.stack([native.read(solved.values, k) for k in range(len(problem.t))])
-        cov = np.full((len(mean), problem.model.manifold.dim, problem.model.manifold.dim), np.nan)
-        if self.covariance:
-            marginals = gtsam.Marginals(graph, solved.values)
-            cov = np.stack([native.covariance(marginals, k, x) for k, x in enumerate(mean)])
-        details = {"build_s": built - began, "solve_s": finished - built, "finished": finished}
-        return self._run(
-            problem,
-            mean,
-            cov,
-            solved.cost,
-            solved.iterations,
-            {**details, "newton_decrement": solved.decrement},
-        )
+        cov = native.covariances(graph, solved.values, mean) if self.covariance else unknown(problem)
+        return self._run(problem, mean, cov, solved, (began, built, finished))
 
     def _batched(self, problem: Problem, start: Array) -> Run:
         began = time.perf_counter()
         chain = ChainGraph(problem)
         built = time.perf_counter()
-        mean, cost, iterations, _ = chain.solve(start, self.max_iterations, self.tolerance, check=self.check)
+        solved = chain.solve(start, self.max_iterations, self.tolerance, check=self.check)
         finished = time.perf_counter()
-        d = problem.model.manifold.dim
-        cov = (
-            chain.covariances(chain.linear_graph()) if self.covariance else np.full((len(mean), d, d), np.nan)
-        )
-        details = {"build_s": built - began, "solve_s": finished - built, "finished": finished}
-        return self._run(problem, mean, cov, cost, iterations, details)
+        cov = chain_marginals(problem, solved.values) if self.covariance else unknown(problem)
+        return self._run(problem, solved.values, cov, solved, (began, built, finished))
 
     def _run(
-        self,
-        problem: Problem,
-        mean: Array,
-        cov: Array,
-        cost: float,
-        iterations: int,
-        details: dict[str, float],
+        self, problem: Problem, mean: Array, cov: Array, solved: Solved, clock: tuple[float, ...]
     ) -> Run:
-        report = Report(self.name, iterations=iterations, cost=cost, details=details)
+        began, built, finished = clock
+        details = {
+            "build_s": built - began,
+            "solve_s": finished - built,
+            "finished": finished,
+            "newton_decrement": solved.decrement,
+        }
+        report = Report(
+            self.name,
+            solved.settled,
+            solved.iterations,
+            cost=solved.cost,
+            message=solved.message(),
+            details=details,
+        )
         return Run(problem.t, mean, cov, problem.model.manifold, {}, float("nan"), report)
+
+
+def unknown(problem: Problem) -> Array:
+    """Covariances (K, d, d) that nobody asked for."""
+    d = problem.model.manifold.dim
+    return np.full((len(problem.t), d, d), np.nan)
 
 
 def build(native: NativeGraph, start: Array) -> tuple[Any, Any]:

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.keys import STATIC, X
-from factorlab.graph.solve import readable
+from factorlab.graph.solve import Solved, newton_decrement, readable
 from sequential.compile import compiled
-from sequential.errors import ModelError, NotConvergedError
+from sequential.errors import ModelError
 from sequential.timeline import Problem, sealed
 
 __all__ = ["ChainGraph", "static_directions"]
@@ -78,8 +78,8 @@ class ChainGraph:
         if singular >= 0:
             when = self.problem.t[singular] * 1e-9
             msg = (
-                f"the process noise up to node {singular} ({when:.3f} s) is singular, so a graph cannot weigh "
-                "that step; declare parts that do not move as static=(…), or give the others some noise"
+                f"the process noise up to node {singular} ({when:.3f} s) is singular, so a graph cannot "
+                "weigh that step; declare parts that do not move as static=(…), or give the others some noise"
             )
             raise ModelError(msg)
         return float(cost)
@@ -120,51 +120,32 @@ class ChainGraph:
             delta[:, self.static] = solution.at(STATIC)
         return delta
 
-    def solve(
-        self, trajectory: Array, max_iterations: int, tolerance: float, *, check: bool
-    ) -> tuple[Array, float, int, float]:
-        """Gauss-Newton with step halving; returns trajectory, cost, iterations and the last largest step."""
-        manifold = self.problem.model.manifold
-        cost, largest = self.linearise(trajectory), np.inf
-        for iteration in range(1, max_iterations + 1):
-            delta = self.step(self.linear_graph())
-            scale = 1.0
-            for _ in range(HALVINGS):
-                trial = manifold.retract(trajectory, scale * delta)
-                reached = self.linearise(trial)
-                if reached <= cost * (1 + 1e-12) + 1e-12:
-                    break
-                scale /= 2
-            largest = scale * float(np.abs(delta).max())
-            gained, cost, trajectory = cost - reached, reached, trial
-            if largest < tolerance or gained < tolerance * max(1e-12, cost) * 1e-3:
-                return trajectory, cost, iteration, largest
-        if check:
-            msg = (
-                f"the graph still moves by {largest:.2g} after {max_iterations} iterations; "
-                "raise max_iterations or mend the start"
-            )
-            raise NotConvergedError(msg)
-        return trajectory, cost, max_iterations, largest
+    def solve(self, start: Array, max_iterations: int, tolerance: float, *, check: bool = True) -> Solved:
+        """Gauss-Newton with step halving, from a trajectory (K, n) to the one in `Solved.values`.
 
-    def covariances(self, graph: Any) -> Array:
-        """(K, d, d) marginals of every node, static directions included."""
-        zero = gtsam.VectorValues()
-        p = len(self.moving)
-        for key in self.keys:
-            zero.insert(key, np.zeros(p))
-        if len(self.static):
-            zero.insert(STATIC, np.zeros(len(self.static)))
-        marginals = gtsam.Marginals(graph, zero)
-        d = p + len(self.static)
-        cov = np.empty((len(self.keys), d, d))
-        order = np.concatenate([self.moving, self.static])
-        inverse = np.argsort(order)
-        for k, key in enumerate(self.keys):
-            if not len(self.static):
-                cov[k] = marginals.marginalCovariance(key)
-                continue
-            joint = marginals.jointMarginalCovariance([key, STATIC])
-            whole = np.block([[joint.at(a, b) for b in (key, STATIC)] for a in (key, STATIC)])
-            cov[k] = whole[np.ix_(inverse, inverse)]
-        return cov
+        Raises
+        ------
+        UnderConstrainedError, NotConvergedError, ModelError
+        """
+        trajectory, cost, iteration = start, self.linearise(start), 0
+        while iteration < max_iterations:
+            iteration += 1
+            delta = self.step(self.linear_graph())
+            trajectory, reached = self._descend(trajectory, cost, delta)
+            gained, cost = cost - reached, reached
+            if np.abs(delta).max() < tolerance or gained < 1e-3 * tolerance * max(1e-12, cost):
+                break
+        decrement = newton_decrement(self.linear_graph(), self.problem, self.ordering)
+        solved = Solved(trajectory, cost, iteration, decrement)
+        return solved.checked() if check else solved
+
+    def _descend(self, trajectory: Array, cost: float, delta: Array) -> tuple[Array, float]:
+        """Go by the step, halved until the cost does not rise; stay where it will not."""
+        scale = 1.0
+        for _ in range(HALVINGS):
+            trial = self.problem.model.manifold.retract(trajectory, scale * delta)
+            reached = self.linearise(trial)
+            if reached <= cost * (1 + 1e-12) + 1e-12:
+                return trial, reached
+            scale /= 2
+        return trajectory, self.linearise(trajectory)

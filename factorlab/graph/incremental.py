@@ -79,8 +79,7 @@ class IncrementalGraph:
         values = engine.calculateEstimate()
         seconds += time.perf_counter() - began
         last = np.stack([native.read(values, k) for k in range(len(problem.t))])
-        marginals = gtsam.Marginals(engine.getFactorsUnsafe(), values)
-        spread = np.stack([native.covariance(marginals, k, x) for k, x in enumerate(last)])
+        spread = native.covariances(engine.getFactorsUnsafe(), values, last)
         report = Report("isam2_final", iterations=len(problem.t), seconds=seconds)
         final = Run(problem.t, last, spread, problem.model.manifold, {}, float("nan"), report)
         return online, replace(final, innovations=leave_one_out(problem, final))
@@ -88,7 +87,13 @@ class IncrementalGraph:
 
 @dataclass(frozen=True, slots=True)
 class FixedLagGraph:
-    """The last `lag` seconds as a graph; what is older is marginalised (gtsam.IncrementalFixedLagSmoother)."""
+    """The last `lag` seconds as a graph; gtsam's IncrementalFixedLagSmoother marginalises what is older.
+
+    Parameters
+    ----------
+    lag : s
+    threshold : tangent step beyond which a variable is relinearised
+    """
 
     lag: float = 5.5
     threshold: float = 0.01

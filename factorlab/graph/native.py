@@ -11,7 +11,7 @@ from functools import singledispatch
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sequential.model import Loss, ProcessModel
 from sequential.timeline import Problem
@@ -61,7 +61,14 @@ class NativeGraph(abc.ABC):
 
     @abc.abstractmethod
     def covariance(self, source: Any, k: int, x: Array) -> Array:
-        """(d, d) in our chart, from anything with `jointMarginalCovariance` or `marginalCovariance`."""
+        """(d, d) in our chart, from `Marginals`, an iSAM2 or a fixed-lag smoother."""
+
+    def covariances(self, graph: Any, values: Any, mean: Array) -> Array:
+        """(K, d, d) of all nodes, given the graph solved at `values`, which are `mean` (K, n)."""
+        import gtsam
+
+        marginals = gtsam.Marginals(graph, values)
+        return np.stack([self.covariance(marginals, k, x) for k, x in enumerate(mean)])
 
 
 @singledispatch
@@ -79,7 +86,7 @@ def native_graph(problem: Problem) -> NativeGraph | None:
     return native_process(problem.model.process, problem)
 
 
-def noise_model(cov: Array, loss: Loss | None = None) -> Any:
+def noise_model(cov: ArrayLike, loss: Loss | None = None) -> Any:
     """GTSAM's noise model of a covariance, wrapped in a robust loss where there is one."""
     import gtsam
 
@@ -91,17 +98,8 @@ def noise_model(cov: Array, loss: Loss | None = None) -> Any:
 
 
 def joint_blocks(source: Any, keys: list[int]) -> Array:
-    """Joint covariance of some variables, in the order of `keys`.
-
-    A source that only knows single marginals (a fixed-lag smoother) gives the diagonal blocks.
-    """
-    if hasattr(source, "jointMarginalCovariance"):
-        joint = source.jointMarginalCovariance(keys)
-        return np.block([[joint.at(a, b) for b in keys] for a in keys])
-    blocks = [source.marginalCovariance(key) for key in keys]
-    size = sum(len(b) for b in blocks)
-    whole, at = np.zeros((size, size)), 0
-    for block in blocks:
-        whole[at : at + len(block), at : at + len(block)] = block
-        at += len(block)
-    return whole
+    """Joint covariance of some variables, in the order of `keys`."""
+    # A fixed-lag smoother answers for single variables only; the tree inside it knows them together.
+    tree = source.getISAM2() if hasattr(source, "getISAM2") else source
+    joint = tree.jointMarginalCovariance(keys)
+    return np.block([[joint.at(a, b) for b in keys] for a in keys])

@@ -71,8 +71,28 @@ class Solved:
     iterations: int
     decrement: float  # what one more Gauss-Newton step promises to take off the cost
 
+    @property
+    def settled(self) -> bool:
+        """Whether one more step promises next to nothing."""
+        return self.decrement <= SETTLED * (1.0 + self.cost)
 
-def newton_decrement(linear: Any, problem: Problem | None = None) -> float:
+    def message(self) -> str:
+        """What is wrong, or nothing."""
+        if self.settled:
+            return ""
+        return (
+            f"the solver stopped after {self.iterations} iterations at cost {self.cost:.6g}, and one more "
+            f"step would take off {self.decrement:.3g}; raise max_iterations or mend the start"
+        )
+
+    def checked(self) -> Solved:
+        """The same; raises `NotConvergedError` unless settled."""
+        if not self.settled:
+            raise NotConvergedError(self.message())
+        return self
+
+
+def newton_decrement(linear: Any, problem: Problem | None = None, *ordering: Any) -> float:
     """Cost that one more Gauss-Newton step promises to take off; it does not depend on units.
 
     Solving for that step also proves full rank: Levenberg-Marquardt returns happily from a graph that
@@ -83,7 +103,7 @@ def newton_decrement(linear: Any, problem: Problem | None = None) -> float:
     UnderConstrainedError
     """
     with readable(problem):
-        step = linear.optimize()
+        step = linear.optimize(*ordering)
     return float(linear.error(gtsam.VectorValues.Zero(step)) - linear.error(step))
 
 
@@ -112,14 +132,8 @@ def optimise(
         if not np.isfinite(cost) or cost > before:
             values, cost, iterations = damped(graph, start, max_iterations)
         linear = graph.linearize(values)
-    decrement = newton_decrement(linear, problem)
-    if check and decrement > SETTLED * (1.0 + cost):
-        msg = (
-            f"the solver stopped after {iterations} iterations at cost {cost:.6g}, and one more step would "
-            f"take off {decrement:.3g}; raise max_iterations or mend the start"
-        )
-        raise NotConvergedError(msg)
-    return Solved(values, cost, iterations, decrement)
+    solved = Solved(values, cost, iterations, newton_decrement(linear, problem))
+    return solved.checked() if check else solved
 
 
 def damped(graph: Any, start: Any, max_iterations: int) -> tuple[Any, float, int]:

@@ -31,10 +31,10 @@ class InertialGraph(NativeGraph):
     the factor (Forster et al. 2017, eq. 44) has little to do.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, process: Strapdown) -> None:
         super().__init__(problem)
         plan = problem.schedule
-        self.parameters = combined_parameters(problem.model.process)
+        self.parameters = combined_parameters(process)
         self.pointer, self.dt = plan.step_ptr.tolist(), plan.step_dt.tolist()
         driven = plan.inputs[plan.step_input]
         self.accel, self.gyro = list(driven[:, :3]), list(driven[:, 3:6])
@@ -95,7 +95,7 @@ class InertialGraph(NativeGraph):
         """GPS factors."""
         plan = self.problem.schedule
         return [
-            self.makers[plan.sensor[r]](X(k), plan.z[r, :3])  # type: ignore[misc]
+            self.makers[plan.sensor[r]](X(k), plan.z[r, :3])
             for r in range(plan.reading_ptr[k], plan.reading_ptr[k + 1])
         ]
 
@@ -165,4 +165,4 @@ def position_factor(sensor: Any) -> Callable[[int, Array], Any] | None:
 def _(process: Strapdown, problem: Problem) -> NativeGraph | None:
     model = problem.model
     native = all(position_factor(s) is not None and s.gate is None for s in model.sensors.values())
-    return InertialGraph(problem) if native and model.manifold.dim == 15 else None
+    return InertialGraph(problem, process) if native and model.manifold.dim == 15 else None

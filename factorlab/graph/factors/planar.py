@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.keys import L, S, X
+from factorlab.graph.marginals import chain_marginals
 from factorlab.graph.native import NativeGraph, joint_blocks, native_process, noise_model
 from sequential.compile import compiled
 from sequential.manifold import SE2, Manifold, Product, Vector
@@ -77,7 +78,7 @@ class PlanarGraph(NativeGraph):
         """Range, range-bearing and position factors."""
         plan = self.problem.schedule
         return [
-            self.makers[plan.sensor[r]](k, plan.z[r], int(plan.context[r, 0]))  # type: ignore[misc]
+            self.makers[plan.sensor[r]](k, plan.z[r], int(plan.context[r, 0]))
             for r in range(plan.reading_ptr[k], plan.reading_ptr[k + 1])
         ]
 
@@ -99,6 +100,12 @@ class PlanarGraph(NativeGraph):
         order = [*range(self.pose, self.pose + 3), self.bias]
         inverse = np.argsort(order)
         return joint[np.ix_(inverse, inverse)]
+
+    def covariances(self, graph: Any, values: Any, mean: Array) -> Array:
+        """The factors are exactly our rows, so that a bias common to all nodes need not cost a query each."""
+        if self.bias is None:
+            return super().covariances(graph, values, mean)
+        return chain_marginals(self.problem, mean)
 
 
 def layout(manifold: Manifold) -> tuple[int, int | None]:
@@ -144,7 +151,7 @@ def sensor_factor(sensor: Any) -> Callable[[int, Array, int], Any] | None:
         return lambda k, z, i: gtsam.RangeFactorWithTransformBias2D(X(k), L(i), S(0), z[0], model, centre)
     if isinstance(sensor, RangeBearing):
         # GTSAM wants the bearing first.
-        model = noise_model(sensor.noise_cov[::-1, ::-1], sensor.loss)
+        model = noise_model(np.asarray(sensor.noise_cov)[::-1, ::-1], sensor.loss)
         return lambda k, z, i: gtsam.BearingRangeFactor2D(X(k), L(i), gtsam.Rot2(z[1]), z[0], model)
     if isinstance(sensor, Position) and sensor.axes == 2 and not np.any(sensor.lever_arm):
         model = noise_model(sensor.noise_cov, sensor.loss)
