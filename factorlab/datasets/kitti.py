@@ -73,7 +73,7 @@ def load_kitti(use_every: int, data: Path | None) -> Dataset:
             "start: position and heading from the second fix and the first 3 m of motion",
             "held-out fixes carry the receiver's own noise (σ about 0.26 m as declared)",
         ),
-        default_estimators=("ekf", "iekf", "ukf", "ekf_rts", "ieks", "fixed_lag", "isam2", "batch"),
+        default_estimators=("ekf", "iekf", "ukf", "ekf_rts", "ieks", "fixed_lag", "isam2", "isam2_final", "batch"),
     )
 
 

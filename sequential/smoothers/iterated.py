@@ -29,11 +29,14 @@ class IteratedSmoother:
     ----------
     max_iterations : Gauss-Newton steps; six or so without a robust loss, dozens with a Cauchy loss
     tolerance : stop when no tangent step exceeds this many standard deviations of the state
+    check : raise where it has not settled
+    leave_one_out : also predict each reading from all others (`Run.innovations`)
     """
 
     max_iterations: int = 100
     tolerance: float = 1e-4
     check: bool = True
+    leave_one_out: bool = True
     name = "ieks"
 
     def solve(self, problem: Problem) -> Run:
@@ -43,7 +46,7 @@ class IteratedSmoother:
         run = self.refine(problem, start.mean)
         seconds = time.perf_counter() - began
         run = replace(run, report=replace(run.report, seconds=seconds), log_likelihood=start.log_likelihood)
-        return replace(run, innovations=leave_one_out(problem, run))
+        return replace(run, innovations=leave_one_out(problem, run)) if self.leave_one_out else run
 
     def refine(self, problem: Problem, trajectory: np.ndarray) -> Run:
         """Gauss-Newton from a given trajectory (K, n)."""
