@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.compare.accuracy import errors_of
-from factorlab.compare.estimators import KINDS, require_names
+from factorlab.compare.estimators import KINDS, NAMES, require_names
 from factorlab.compare.fitting import fit
 from factorlab.compare.honesty import nis_of, normalised_error_of
 from factorlab.compare.table import Comparison, Row
@@ -53,7 +53,7 @@ def compare(
     DataError, ModelError
         where the log or the model is at fault; a solver that fails becomes a row with its message.
     """
-    names = require_names(tuple(estimators or dataset.default_estimators))
+    names = require_names(tuple(estimators) if estimators else _recommended(dataset))
     step = _Steps(progress, len(names) * (2 if tune else 1) + tune + 1)
     untuned: tuple[Row, ...] = ()
     tuned, model = None, dataset.model
@@ -66,6 +66,12 @@ def compare(
     step("diagnosis")
     findings = findings_of(problem, rows)
     return Comparison(dataset, model, rows, findings, _readings(dataset), seed, untuned, tuned)
+
+
+def _recommended(dataset: Dataset) -> tuple[str, ...]:
+    """The dataset's own choice; one pass of iSAM2 gives two rows."""
+    chosen = dataset.default_estimators
+    return tuple(name for name in NAMES if name in chosen or (name == "isam2_final" and "isam2" in chosen))
 
 
 class _Steps:

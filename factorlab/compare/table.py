@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
@@ -138,9 +139,14 @@ def document(comparisons: tuple[Comparison, ...], command: str) -> dict[str, Any
     if len(comparisons) == 1:
         whole |= comparisons[0].to_json()
     else:
-        whole["runs"] = {comparison.name: comparison.to_json() for comparison in comparisons}
+        whole["runs"] = {_key(comparison.name): comparison.to_json() for comparison in comparisons}
     whole |= {"versions": versions(), "command": command}
     return {key: strict(value) for key, value in whole.items()}
+
+
+def _key(name: str) -> str:
+    """`mrclam robot 1` of a recording called `mrclam-robot1`."""
+    return re.sub(r"-robot(\d+)$", r" robot \1", name)
 
 
 def strict(value: Any) -> Any:

@@ -62,9 +62,7 @@ def _dots(axes: Axes, row: Row, sensor: str) -> None:
     log_axis(axes)
     axes.set_ylabel(f"NIS of {sensor}")
     kind = "" if taken.kind == "filter" else f", {taken.kind}"
-    axes.set_title(
-        f"{row.title}, {sensor}{kind}: mean {nis.mean():.3g}, {inside:.0f} % inside (95 % expected)"
-    )
+    axes.set_title(f"{row.title}{kind}: mean {nis.mean():.3g}, {inside:.0f} % inside (95 % exp.)")
 
 
 def autocorrelations(comparison: Comparison) -> Figure | None:

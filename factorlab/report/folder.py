@@ -6,7 +6,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sequential.errors import DataError
@@ -71,6 +71,8 @@ def _move(source: Path, target: Path) -> None:
         return
     for name in _earlier_files(target):
         (target / name).unlink(missing_ok=True)
+        with suppress(OSError):  # not empty, or gone already
+            (target / name).parent.rmdir()
     # the manifest last, so that a folder with one is complete
     files = sorted((p for p in source.rglob("*") if p.is_file()), key=lambda p: p.name == MANIFEST)
     for path in files:

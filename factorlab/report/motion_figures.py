@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,7 +13,7 @@ from factorlab.compare import Comparison, Row
 from factorlab.compare.accuracy import has_position, scored_sensor
 from factorlab.compare.text import figure
 from factorlab.report.pair import filter_of, smoother_of
-from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, title_of, widths
+from factorlab.report.style import blank, broken, legend_below, line_of, log_axis, thin, title_of, widths
 from sequential.log import seconds
 from sequential.models import Position
 
@@ -19,6 +21,8 @@ __all__ = ["envelopes", "errors_over_time", "sigmas", "trajectory"]
 
 Array = NDArray[np.float64]
 ZOOM_S = 9.0
+Window = tuple[int, int]
+EVERYTHING: Window = (-(2**63), 2**63 - 1)
 
 
 def trajectory(comparison: Comparison) -> Figure | None:
@@ -39,26 +43,38 @@ def trajectory(comparison: Comparison) -> Figure | None:
     return drawing
 
 
-def _paths(axes: Axes, comparison: Comparison, dot: float) -> None:
+def _paths(axes: Axes, comparison: Comparison, dot: float, window: Window = EVERYTHING) -> None:
+    """Truth, estimates and readings between two times (ns)."""
     dataset = comparison.dataset
     if dataset.truth is not None:
-        kept = thin(len(dataset.truth))
-        axes.plot(
-            *dataset.truth.position[kept, :2].T, color="#888888", linewidth=2.5, alpha=0.6, label="truth"
-        )
+        place = dataset.truth.position[_inside(dataset.truth.t, window)]
+        axes.plot(*place[thin(len(place)), :2].T, color="#888888", linewidth=2.5, alpha=0.6, label="truth")
     for row, width in zip(comparison.rows, widths(len(comparison.rows)), strict=True):
         if row.run is not None:
-            path = dataset.positions(row.run)
-            axes.plot(*path[thin(len(path)), :2].T, linewidth=width, label=row.title, **line_of(row.name))
+            near = _inside(row.run.t, window)
+            path = _line(dataset.positions(row.run)[near, :2], seconds(row.run.t[near]))
+            axes.plot(*path.T, linewidth=width, label=row.title, **line_of(row.name))
     name = scored_sensor(comparison.model)
     if isinstance(comparison.model.sensors[name], Position):
         if dataset.held_out is not None:
-            held = dataset.held_out.values[thin(len(dataset.held_out)), :2]
-            axes.plot(
-                *held.T, "o", color="#666666", fillstyle="none", markersize=dot, zorder=5, label="held out"
-            )
-        used = dataset.log[name].values
+            held = dataset.held_out.values[_inside(dataset.held_out.t, window)]
+            look: dict[str, Any] = {"color": "#666666", "fillstyle": "none", "markersize": dot, "zorder": 5}
+            axes.plot(*held[thin(len(held)), :2].T, "o", label="held out", **look)
+        used = dataset.log[name].values[_inside(dataset.log[name].t, window)]
         axes.plot(*used[thin(len(used)), :2].T, "+", color="#444444", markersize=7, label="used")
+
+
+def _inside(t: NDArray[np.int64], window: Window) -> NDArray[np.bool_]:
+    return (t >= window[0]) & (t <= window[1])
+
+
+def _line(values: Array, t: Array) -> Array:
+    """A path thinned to what can be seen, with a break (NaN) where nothing was estimated for long."""
+    if not len(values):
+        return values
+    rows = thin(len(values))
+    cut = broken(t, rows)
+    return np.insert(values[rows], np.flatnonzero(cut), np.nan, axis=0)
 
 
 def _worst(comparison: Comparison) -> tuple[Row, int] | None:
@@ -70,17 +86,17 @@ def _worst(comparison: Comparison) -> tuple[Row, int] | None:
 
 
 def _zoom(axes: Axes, comparison: Comparison, row: Row, t: int) -> None:
-    _paths(axes, comparison, 5.0)
     assert row.run is not None and row.errors is not None  # noqa: S101, PT018 - _worst has looked
-    near = np.abs(row.run.t - t) <= ZOOM_S * 1e9
-    path = comparison.dataset.positions(row.run)[near, :2]
-    centre = path.mean(axis=0)
+    half = int(ZOOM_S * 1e9)
+    _paths(axes, comparison, 5.0, (t - half, t + half))
+    path = comparison.dataset.positions(row.run)[_inside(row.run.t, (t - half, t + half)), :2]
+    middle = 0.5 * (path.max(axis=0) + path.min(axis=0))
     reach = 0.6 * max(float(np.ptp(path, axis=0).max()), 4 * row.errors.rmse())
-    axes.set_xlim(centre[0] - reach, centre[0] + reach)
-    axes.set_ylim(centre[1] - reach, centre[1] + reach)
+    axes.set_xlim(middle[0] - reach, middle[0] + reach)
+    axes.set_ylim(middle[1] - reach, middle[1] + reach)
     axes.set_aspect("equal", adjustable="box")
     when = seconds(np.array(t), int(row.run.t[0]))
-    axes.set_title(f"where {row.title} is farthest off, around t = {when:.0f} s")
+    axes.set_title(f"{2 * ZOOM_S:.0f} s around t = {when:.0f} s, where {row.title} is farthest off")
 
 
 def errors_over_time(comparison: Comparison) -> Figure | None:
@@ -92,11 +108,9 @@ def errors_over_time(comparison: Comparison) -> Figure | None:
     one = axes[0, 0]
     for row, width in zip(rows, widths(len(rows)), strict=True):
         t, errors = _times(row), row.errors
-        kept = thin(len(t))
         length = np.maximum(np.linalg.norm(errors.error, axis=1), 1e-4)  # type: ignore[union-attr]
         one.plot(
-            t[kept],
-            length[kept],
+            *_line(np.column_stack([t, length]), t).T,
             linewidth=width,
             label=f"{title_of(row.name)}: {figure(row.rmse)}",
             **line_of(row.name),

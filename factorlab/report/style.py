@@ -21,6 +21,7 @@ from factorlab.compare import KINDS
 __all__ = [
     "LINES",
     "blank",
+    "broken",
     "inline_svg",
     "legend_below",
     "line_of",
@@ -46,6 +47,7 @@ LINES: dict[str, dict[str, Any]] = {
 }
 WIDTH = 11.0  # inches, which the page shows at its full width
 MOST_POINTS = 1500
+PAUSE_S, PAUSE_FACTOR = 2.0, 20.0
 
 RC = {
     "svg.fonttype": "none",  # letters stay text: small, and they can be searched
@@ -114,6 +116,20 @@ def legend_below(figure: Figure, axes: Axes, columns: int = 6) -> None:
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=columns)
 
 
+def broken(t: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Where a line over times t (s), drawn at `rows`, is to be broken: after an unusual pause."""
+    steps = np.diff(t)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gap = np.concatenate([[False], steps > max(PAUSE_S, PAUSE_FACTOR * usual)])
+    count = np.cumsum(gap)[rows]  # pauses so far
+    return np.diff(count, prepend=count[:1]) > 0
+
+
+def _shorter(tag: re.Match[str]) -> str:
+    """A tag whose coordinates have three decimals: a thousandth of a point is enough."""
+    return re.sub(r"(\.\d{3})\d+", r"\1", tag.group())
+
+
 def thin(count: int, most: int = MOST_POINTS) -> NDArray[np.int64]:
     """Rows of a long line that are enough to draw it."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
@@ -137,7 +153,7 @@ def inline_svg(name: str, draw: Callable[[], Figure | None], label: str) -> str 
     text = re.sub(r'<svg ([^>]*?)width="[^"]*"', r"<svg \1", text, count=1)
     text = re.sub(r'<svg ([^>]*?)height="[^"]*"', r"<svg \1", text, count=1)
     text = re.sub(r'(id="|url\(#|href="#)', rf"\g<1>{name}-", text)
-    text = re.sub(r"(\.\d{3})\d+", r"\1", text)  # a thousandth of a point is enough
+    text = re.sub(r"<[^>]*>", _shorter, text)
     text = re.sub(r"\n\s*", "\n", text)
     escaped = label.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
     return text.replace("<svg ", f'<svg role="img" aria-label="{escaped}" ', 1)

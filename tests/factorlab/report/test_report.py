@@ -126,13 +126,14 @@ def test_force_takes_away_an_earlier_report_and_nothing_else(tmp_path):
                 json.dumps({"files": [*names, "report.json"]}), encoding="utf-8"
             )
 
-    write("trajectories/ekf.tum", "trajectories/ukf.tum", force=False)
+    write("trajectories/ekf.tum", "other/ukf.tum", force=False)
     (out / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(OutputExistsError, match="--force"):
         write("trajectories/ekf.tum", force=False)
     write("trajectories/ekf.tum", force=True)
     kept = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()}
     assert kept == {"notes.txt", "report.json", "trajectories/ekf.tum"}
+    assert not (out / "other").exists()
 
 
 def test_a_manifest_cannot_reach_outside(tmp_path):
