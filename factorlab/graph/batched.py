@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.keys import STATIC, X
-from factorlab.graph.solve import Solved, newton_decrement, readable
+from factorlab.graph.solve import Solved, certain_move, newton_decrement, readable
 from sequential.compile import compiled
-from sequential.errors import ModelError
 from sequential.timeline import Problem, sealed
 
 __all__ = ["ChainGraph", "static_directions"]
@@ -76,12 +75,7 @@ class ChainGraph:
         )  # fmt: skip
         self.whole.raise_failures()
         if singular >= 0:
-            when = self.problem.t[singular] * 1e-9
-            msg = (
-                f"the process noise up to node {singular} ({when:.3f} s) is singular, so a graph cannot "
-                "weigh that step; declare parts that do not move as static=(…), or give the others some noise"
-            )
-            raise ModelError(msg)
+            raise certain_move(self.problem, singular)
         return float(cost)
 
     def linear_graph(self) -> Any:

@@ -12,10 +12,10 @@ import gtsam
 import numpy as np
 
 from factorlab.graph.keys import name_of
-from sequential.errors import NotConvergedError, SolverError, UnderConstrainedError
+from sequential.errors import ModelError, NotConvergedError, SolverError, UnderConstrainedError
 from sequential.timeline import Problem
 
-__all__ = ["Solved", "newton_decrement", "optimise", "readable"]
+__all__ = ["Solved", "certain_move", "newton_decrement", "optimise", "readable"]
 
 SETTLED = 1e-3  # share of (1 + cost) that one more Gauss-Newton step may still promise
 WORDS = {
@@ -41,8 +41,17 @@ def under_constrained(text: str, problem: Problem | None) -> str:
     if problem is not None and digits.isdigit() and int(digits) < len(problem.t) and letter in "xvb":
         when = f" at {problem.t[int(digits)] * 1e-9:.3f} s"
     return (
-        f"the graph leaves {name} ({what}{when}) free: no prior or measurement fixes it; "
-        "add a prior, an absolute sensor, or process noise that ties it to its neighbours"
+        f"the graph leaves {name} ({what}{when}) free: no prior or measurement fixes it, or noises differ "
+        "so much that rounding hides what does; add a prior, an absolute sensor, or process noise that "
+        "ties it to its neighbours"
+    )
+
+
+def certain_move(problem: Problem, node: int) -> ModelError:
+    """The error for a move without noise: a graph weighs each one by the inverse of its covariance."""
+    return ModelError(
+        f"the process noise up to node {node} ({problem.t[node] * 1e-9:.3f} s) is singular, so a graph "
+        "cannot weigh that step; declare parts that do not move as static=(…), or give the others some noise"
     )
 
 
@@ -56,7 +65,9 @@ def readable(problem: Problem | None = None) -> Iterator[None]:
         if "ndeterminant" in text or "underconstrained" in text:
             raise UnderConstrainedError(under_constrained(text, problem)) from error
         if "does not exist" in text:
-            msg = f"a factor names a variable that has no initial value: {text.strip().splitlines()[0]}"
+            found = re.search(r'key "(\w+)"', text)
+            name = found.group(1) if found else "a variable"
+            msg = f"a factor names {name}, which has no initial value; insert one, or drop the factor"
             raise SolverError(msg) from error
         msg = f"GTSAM could not solve the graph: {text.strip().splitlines()[0]}"
         raise SolverError(msg) from error

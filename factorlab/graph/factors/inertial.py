@@ -38,7 +38,8 @@ class InertialGraph(NativeGraph):
         self.pointer, self.dt = plan.step_ptr.tolist(), plan.step_dt.tolist()
         driven = plan.inputs[plan.step_input]
         self.accel, self.gyro = list(driven[:, :3]), list(driven[:, 3:6])
-        self.makers = [position_factor(s) for s in problem.model.sensors.values()]
+        body = next(iter(problem.model.manifold.parts))  # type: ignore[attr-defined]
+        self.makers = [position_factor(s, body) for s in problem.model.sensors.values()]
 
     def keys(self, k: int) -> list[int]:
         """Pose, velocity, bias."""
@@ -149,9 +150,11 @@ def flat_pose(pose: Any) -> Array:
     return flat
 
 
-def position_factor(sensor: Any) -> Callable[[int, Array], Any] | None:
-    """Maker of the native factor of a sensor, or None where it has none."""
+def position_factor(sensor: Any, body: str) -> Callable[[int, Array], Any] | None:
+    """Maker of the native factor of a sensor on the part `body`, or None where it has none."""
     if not isinstance(sensor, Position) or sensor.axes != 3:
+        return None
+    if sensor.gate is not None or sensor.part not in {None, body}:
         return None
     model = noise_model(sensor.noise_cov, sensor.loss)
     arm = np.zeros(3)
@@ -163,6 +166,10 @@ def position_factor(sensor: Any) -> Callable[[int, Array], Any] | None:
 
 @native_process.register
 def _(process: Strapdown, problem: Problem) -> NativeGraph | None:
-    model = problem.model
-    native = all(position_factor(s) is not None and s.gate is None for s in model.sensors.values())
-    return InertialGraph(problem, process) if native and model.manifold.dim == 15 else None
+    model, noise = problem.model, process.noise
+    # CombinedImuFactor has a bias at every node, and inverts its walk: nothing may be static or certain.
+    densities = (noise.accel_density, noise.gyro_density, noise.accel_bias_walk, noise.gyro_bias_walk)
+    if model.manifold.dim != 15 or model.static or not min(densities) > 0:
+        return None
+    native = InertialGraph(problem, process)
+    return native if all(native.makers) else None

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from factorlab.graph.keys import L, S, X
 from factorlab.graph.marginals import chain_marginals
 from factorlab.graph.native import NativeGraph, joint_blocks, native_process, noise_model
+from factorlab.graph.solve import certain_move
 from sequential.compile import compiled
 from sequential.manifold import SE2, Manifold, Product, Vector
+from sequential.model import StateSpace
 from sequential.models import Position, Range, RangeBearing, Unicycle
 from sequential.timeline import Problem
 
@@ -127,7 +129,11 @@ def odometry(problem: Problem) -> tuple[Array, Array]:
     arrived = np.empty_like(start)
     transition, noise = np.empty((nodes, d, d)), np.empty((nodes, d, d))
     walk(whole.tables, problem.schedule, start, arrived, transition, noise)
-    return arrived[:, at : at + 3], noise[:, at : at + 3, at : at + 3]
+    noise = noise[:, at : at + 3, at : at + 3]
+    certain = np.flatnonzero(np.linalg.eigvalsh(noise[1:])[:, 0] <= 0)
+    if len(certain):
+        raise certain_move(problem, int(certain[0]) + 1)
+    return arrived[:, at : at + 3], noise
 
 
 def landmarks(problem: Problem) -> list[Array]:
@@ -170,21 +176,27 @@ def one_table(problem: Problem) -> bool:
 @native_process.register
 def _(process: Unicycle, problem: Problem) -> NativeGraph | None:
     model = problem.model
-    manifold = model.manifold
-    parts = [manifold] if isinstance(manifold, SE2) else list(getattr(manifold, "parts", {}).values())
-    biases = [m for m in parts if isinstance(m, Vector)]
-    plain = len(parts) - len(biases) == 1 and len(biases) <= 1 and all(b.size == 1 for b in biases)
-    fits = plain and (not biases or (isinstance(manifold, Product) and len(model.static) == 1))
-    fits = fits and type(process) is Unicycle and one_table(problem)
-    native = all(sensor_factor(s) is not None for s in model.sensors.values())
-    return PlanarGraph(problem) if fits and native and not correlated(model) else None
+    fits = type(process) is Unicycle and known_layout(model) and one_table(problem) and not correlated(model)
+    native = fits and all(sensor_factor(s) is not None for s in model.sensors.values())
+    return PlanarGraph(problem) if native else None
 
 
-def correlated(model: Any) -> bool:
+def known_layout(model: StateSpace) -> bool:
+    """Whether the state is one pose, with one static number beside it or none."""
+    if isinstance(model.manifold, SE2):
+        return not model.static
+    if not isinstance(model.manifold, Product):
+        return False
+    poses = [name for name, part in model.manifold.parts.items() if isinstance(part, SE2)]
+    others = [name for name in model.manifold.parts if name not in poses]
+    single = all(model.manifold.parts[name] == Vector(1) for name in others)
+    return len(poses) == 1 and len(others) <= 1 and single and list(model.static) == others
+
+
+def correlated(model: StateSpace) -> bool:
     """Whether the prior ties the pose to the bias, which separate native priors cannot say."""
     cov = model.prior.cov
     if len(cov) == 3:
         return False
     pose, bias = layout(model.manifold)
-    cross = cov[pose : pose + 3, bias]
-    return bool(np.abs(cross).max() > 0)
+    return bool(np.abs(cov[pose : pose + 3, bias]).max() > 0)
