@@ -111,6 +111,8 @@ def _honesty(row: Row) -> Finding:
     status = "PASS" if fits else status
     against = "held-out readings" if honest.against == "held-out" else "the truth"
     what = f"{honest.mean:.3g} where {honest.expected:g} is expected, median {honest.median:.2g}"
+    if fits and not honest.inside:
+        what += f"; resampled by gaps the mean is {low:.2g} – {high:.2g}, which holds {honest.expected:g}"
     if fits:
         meaning, action = f"errors against {against} are as large as stated ({what})", ""
     elif factor > 1:

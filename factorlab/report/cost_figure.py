@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from factorlab.compare import Comparison, Row
 from factorlab.report.style import LINES, blank, legend_below, log_axis
@@ -28,6 +29,8 @@ def cost(comparison: Comparison) -> Figure | None:
             one.plot(x, y, color=LINES[row.name]["color"], linewidth=0.5, alpha=0.6)
         _mark(one, row, hollow=False)
     log_axis(one, "xy")
+    for axis in (one.xaxis, one.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     unit = "m" if rows[0].errors is not None and rows[0].errors.metres else "sensor's unit"
     one.set(xlabel="time for each reading, µs", ylabel=f"RMSE, {unit}")
     one.set_title(
