@@ -12,13 +12,15 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-__all__ = ["MODEL_SIGNATURE", "allocating", "bare", "bare_as", "call"]
+__all__ = ["MODEL_SIGNATURE", "allocating", "bare", "bare_as", "call", "inlined"]
 
 # Numba counts a reference for every array that a function is handed, and for each one inside a record:
 # 250 ns for a call that takes a model.  `bare` functions allocate nothing and do without the counting, which
 # makes a filter step three times as quick.  `allocating` ones say that they need it, since a function
 # compiled on behalf of a bare one would inherit its flags.
+# `inlined` ones take records, which are a kilobyte to copy.
 bare = njit(cache=True, error_model="numpy", _nrt=False)
+inlined = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 
 
 def bare_as(signature: Any) -> Any:

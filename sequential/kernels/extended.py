@@ -14,11 +14,11 @@ from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2
 from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
-from sequential.kernels.call import allocating, bare, call
+from sequential.kernels.call import allocating, bare, call, inlined
 from sequential.kernels.charts import retract, transport
 from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply, push_covariance
 from sequential.kernels.records import MODEL, SCHEDULE
-from sequential.kernels.sensing import loss_weight, measure, process_jacobian, sensor_jacobian
+from sequential.kernels.sensing import loss_weight, measure, process_jacobian, scratch_size, sensor_jacobian
 
 __all__ = ["FILTERED", "Filtered", "filter_log"]
 
@@ -43,7 +43,7 @@ FILTERED = types.NamedTuple([_f2, _f3, _f2, _f3, _f3, _f2, _f3, _i1], Filtered)
 FINISHED = types.Tuple([types.float64, types.int64])
 
 
-@bare
+@inlined
 def predict(model, plan, node, belief, x, p, phi, keep, work):
     """Carry belief = [x | p] (and phi with `keep`) along the steps that lead to a node."""
     d, width = model.d, plan.inputs.shape[1]
@@ -106,7 +106,7 @@ def iterate(model, plan, reading, x, p, weight, iterations, update, work, expect
     joseph(p, h, gain, noise, weight, m, d, work[0], work[1], scaled)
 
 
-@bare
+@inlined
 def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):
     """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if S is indefinite."""
     s = plan.sensor[reading]
@@ -177,8 +177,9 @@ def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
     copy_matrix(prior_cov, p)
     phi = np.eye(d)
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
+    flat = np.empty(scratch_size(n, d, widest))
     update = (
-        np.empty((widest, d)), np.empty(widest * d), np.empty((widest, d)), np.empty((widest, d)),
+        np.empty((widest, d)), flat, np.empty((widest, d)), np.empty((widest, d)),
         np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
         np.empty(d), np.empty(d),
     )  # fmt: skip

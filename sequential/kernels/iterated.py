@@ -14,7 +14,7 @@ from numba import njit, types
 
 from sequential.kernels.arrays import f0, f1, f2, i0, w2
 from sequential.kernels.belief import gain_and_innovation, joseph
-from sequential.kernels.call import bare, bare_as
+from sequential.kernels.call import bare, bare_as, inlined
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
 from sequential.kernels.matrices import (
@@ -26,7 +26,7 @@ from sequential.kernels.matrices import (
     push_covariance,
 )
 from sequential.kernels.records import MODEL, SCHEDULE
-from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
+from sequential.kernels.sensing import loss_weight, measure, scratch_size, sensor_jacobian
 
 __all__ = ["LINEARISED", "Linearised", "filter_steps"]
 
@@ -45,7 +45,7 @@ _f2, _f3 = types.float64[:, ::1], types.float64[:, :, ::1]
 LINEARISED = types.NamedTuple([_f2, _f3, _f2, _f3, _f3], Linearised)
 
 
-@bare
+@inlined
 def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, expected, residual):
     """Update the belief about δ by one reading linearised at the trajectory, with the robust weight there."""
     s = plan.sensor[reading]
@@ -146,8 +146,9 @@ def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):
     x, q = belief[:n], belief[n:].reshape((d, d))
     frames = (np.empty((d, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
+    flat = np.empty(scratch_size(n, d, widest))
     update = (
-        np.empty((widest, d)), np.empty(widest * d), np.empty((widest, d)), np.empty((widest, d)),
+        np.empty((widest, d)), flat, np.empty((widest, d)), np.empty((widest, d)),
         np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
     )  # fmt: skip
     states = trajectory.reshape(-1)

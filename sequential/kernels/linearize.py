@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2, i1
-from sequential.kernels.call import bare
+from sequential.kernels.call import bare, inlined
 from sequential.kernels.charts import transport
 from sequential.kernels.extended import predict
 from sequential.kernels.matrices import (
@@ -26,7 +26,7 @@ from sequential.kernels.matrices import (
     solve_lower,
 )
 from sequential.kernels.records import MODEL, SCHEDULE
-from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
+from sequential.kernels.sensing import loss_weight, measure, scratch_size, sensor_jacobian
 
 __all__ = ["ROWS", "Rows", "linearise_chain", "walk"]
 
@@ -59,7 +59,7 @@ def loss_cost(kind, k, squared):
     return 0.5 * squared if r <= k else k * (r - 0.5 * k)
 
 
-@bare
+@inlined
 def write_reading(model, plan, reading, states, at, row, moving, static, update, rows):
     """Whitened rows of one reading; returns its cost."""
     s = plan.sensor[reading]
@@ -209,8 +209,9 @@ def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, stat
         np.empty((d, 2 * d + 1)),
     )
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
+    flat = np.empty(scratch_size(n, d, widest))
     update = (
-        np.empty((widest, d)), np.empty(widest * d), np.zeros((widest, widest)), np.empty(widest),
+        np.empty((widest, d)), flat, np.zeros((widest, widest)), np.empty(widest),
         np.empty(widest), np.empty((widest, 1)),
     )  # fmt: skip
     states = trajectory.reshape(-1)

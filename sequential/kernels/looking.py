@@ -7,7 +7,7 @@ from numba import njit, types
 
 from sequential.kernels.arrays import f2, i1
 from sequential.kernels.records import MODEL, SCHEDULE
-from sequential.kernels.sensing import measure, sensor_jacobian
+from sequential.kernels.sensing import measure, scratch_size, sensor_jacobian
 
 __all__ = ["look_at_readings"]
 
@@ -18,7 +18,7 @@ _f2, _f3 = types.float64[:, ::1], types.float64[:, :, ::1]
 def look_at_readings(model, plan, trajectory, node_of, out_residual, out_jacobian):
     """Residuals local(expected, z) (M, m) and Jacobians (M, m, d) at the states (K, n) of their nodes."""
     widest = plan.z.shape[1]
-    expected, flat = np.empty(widest), np.empty(widest * model.d)
+    expected, flat = np.empty(widest), np.empty(scratch_size(model.n, model.d, widest))
     states = trajectory.reshape(-1)
     for reading in range(len(node_of)):
         at = node_of[reading] * model.n

@@ -12,13 +12,19 @@ import math
 import numpy as np
 
 from sequential.kernels.arrays import f0, i0
-from sequential.kernels.call import allocating, bare, bare_as, call
+from sequential.kernels.call import allocating, bare, bare_as, call, inlined
 from sequential.kernels.charts import local, retract
 
-__all__ = ["loss_weight", "measure", "process_jacobian", "sensor_jacobian"]
+__all__ = ["loss_weight", "measure", "process_jacobian", "scratch_size", "sensor_jacobian"]
 
 STEP = 1e-6  # of central differences, in the units of the tangent
 CAUCHY = 2
+
+
+@bare_as(i0(i0, i0, i0))
+def scratch_size(n, d, widest):
+    """Numbers that a look may need: a Jacobian, or a step, a state and three measurements."""
+    return max(widest * d, d + n + 3 * widest)
 
 
 @allocating
@@ -41,7 +47,7 @@ def difference_process(model, x, u, row, dt, after, out):
             out[i, j] = (gone[i] - came[i]) / (2.0 * STEP)
 
 
-@bare
+@inlined
 def process_jacobian(model, x, u, row, dt, after, out):
     """F (d, d) of the step from x, declared or differenced; `after` is the state after the step."""
     if model.jacobian != 0:
@@ -50,7 +56,7 @@ def process_jacobian(model, x, u, row, dt, after, out):
         difference_process(model, x, u, row, dt, after, out)
 
 
-@bare
+@inlined
 def measure(model, plan, reading, x, x_at, expected, residual):
     """Expected measurement at x, and residual = local(expected, z)."""
     s = plan.sensor[reading]
@@ -62,35 +68,38 @@ def measure(model, plan, reading, x, x_at, expected, residual):
     local(model.z_table, model.z_first[s], model.z_first[s + 1], expected, 0, plan.z_flat, z_at, residual, 0)
 
 
-@allocating
-def difference_sensor(model, plan, reading, x, x_at, expected, out):
-    """H (m, d) at x by central differences about the expected measurement."""
-    s = plan.sensor[reading]
-    m, d, width = model.z_dim[s], model.d, plan.context.shape[1]
-    at = model.sensor_params_at[s]
-    blocks, first, last = len(model.table), model.z_first[s], model.z_first[s + 1]
-    xi, moved, seen = np.zeros(d), np.empty(model.n), np.empty(model.z_size[s])
-    gone, came = np.empty(m), np.empty(m)
-    for j in range(d):
-        xi[j] = STEP
-        retract(model.table, 0, blocks, x, x_at, xi, 0, moved, 0)
-        call(model.observe[s], moved, 0, plan.context, reading * width, 0.0, model.sensor_params, at, seen, 0)
-        local(model.z_table, first, last, expected, 0, seen, 0, gone, 0)
-        xi[j] = -STEP
-        retract(model.table, 0, blocks, x, x_at, xi, 0, moved, 0)
-        call(model.observe[s], moved, 0, plan.context, reading * width, 0.0, model.sensor_params, at, seen, 0)
-        local(model.z_table, first, last, expected, 0, seen, 0, came, 0)
-        xi[j] = 0.0
-        for i in range(m):
-            out[i, j] = (gone[i] - came[i]) / (2.0 * STEP)
-
-
 @bare
+def difference_sensor(model, plan, reading, x, x_at, expected, flat, out):
+    """H (m, d) at x by central differences about the expected measurement; `flat` is scratch."""
+    s = plan.sensor[reading]
+    m, d, u = model.z_dim[s], model.d, reading * plan.context.shape[1]
+    at, observe = model.sensor_params_at[s], model.observe[s]
+    blocks, first, last = len(model.table), model.z_first[s], model.z_first[s + 1]
+    moved, seen = d, d + model.n
+    gone = seen + model.z_size[s]
+    came = gone + m
+    for j in range(d):
+        flat[j] = 0.0
+    for j in range(d):
+        flat[j] = STEP
+        retract(model.table, 0, blocks, x, x_at, flat, 0, flat, moved)
+        call(observe, flat, moved, plan.context, u, 0.0, model.sensor_params, at, flat, seen)
+        local(model.z_table, first, last, expected, 0, flat, seen, flat, gone)
+        flat[j] = -STEP
+        retract(model.table, 0, blocks, x, x_at, flat, 0, flat, moved)
+        call(observe, flat, moved, plan.context, u, 0.0, model.sensor_params, at, flat, seen)
+        local(model.z_table, first, last, expected, 0, flat, seen, flat, came)
+        flat[j] = 0.0
+        for i in range(m):
+            out[i, j] = (flat[gone + i] - flat[came + i]) / (2.0 * STEP)
+
+
+@inlined
 def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
-    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` holds m·d numbers."""
+    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` as from `scratch_size`."""
     s = plan.sensor[reading]
     if model.observe_jacobian[s] == 0:
-        difference_sensor(model, plan, reading, x, x_at, expected, out)
+        difference_sensor(model, plan, reading, x, x_at, expected, flat, out)
         return
     call(
         model.observe_jacobian[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
