@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.native import NativeGraph, native_graph
+from factorlab.graph.online import predicted_innovations
 from factorlab.graph.solve import readable
 from sequential.errors import ModelError
 from sequential.history import Report, Run
@@ -108,11 +109,10 @@ class FixedLagGraph:
 
 
 def online_run(problem: Problem, mean: Array, cov: Array, name: str, seconds: float) -> Run:
-    """Leaving the newest reading out of an online estimate gives the innovation of a filter."""
+    """The `Run` of an online engine, with the innovations of a filter."""
     report = Report(name, iterations=len(mean), seconds=seconds)
-    run = Run(problem.t, mean, cov, problem.model.manifold, {}, float("nan"), report)
-    left_out = leave_one_out(problem, run)
-    return replace(run, innovations={k: replace(v, kind="filter") for k, v in left_out.items()})
+    innovations = predicted_innovations(problem, mean, cov)
+    return Run(problem.t, mean, cov, problem.model.manifold, innovations, float("nan"), report)
 
 
 def walk(
