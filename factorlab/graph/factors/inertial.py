@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 # GTSAM inverts the covariance of a preintegration; without any integration noise a segment of one sample
 # would make it singular.  This is 10 nm/√s.
 LEAST_INTEGRATION = 1e-8
+UNCORRELATED = 1e-9  # a correlation below this is rounding
 
 
 class InertialGraph(NativeGraph):
@@ -53,37 +54,48 @@ class InertialGraph(NativeGraph):
         """Three variables."""
         values.insert(X(k), pose3(x))
         values.insert(V(k), x[7:10])
-        values.insert(B(k), gtsam.imuBias.ConstantBias(x[10:13], x[13:16]))
+        values.insert(B(k), constant_bias(x))
 
     def insert_shared(self, values: Any, x: Array) -> None:
         """Nothing to insert."""
 
     def prior_factors(self) -> list[Any]:
-        """Three priors, or one container of the whole where pose, velocity and bias are correlated."""
+        """One prior for each part, or one container of the whole where the parts are correlated."""
         prior = self.problem.model.prior
+        pose, velocity, bias = self.keys(0)
+        # Position and velocity step along the body's axes here, along the world's in these factors.
         turn = to_world(prior.mean)
+        turn[3:6, 3:6] = turn[6:9, 6:9]
         cov = turn @ prior.cov @ turn.T
-        spans = (slice(0, 6), slice(6, 9), slice(9, 15))
-        rest = cov.copy()
+        spans = (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 15))
+        rest = prior.cov / np.sqrt(np.outer(np.diag(prior.cov), np.diag(prior.cov)))
         for s in spans:
             rest[s, s] = 0.0
+        if np.abs(rest).max() > UNCORRELATED:
+            return [self._container()]
+        models = [noise_model(cov[s, s]) for s in spans]
+        # PriorFactorPose3 measures along SE(3)'s exponential, where our position and rotation are apart.
+        return [
+            gtsam.PoseRotationPrior3D(pose, pose3(prior.mean).rotation(), models[0]),
+            gtsam.PoseTranslationPrior3D(pose, prior.mean[4:7], models[1]),
+            gtsam.PriorFactorVector(velocity, prior.mean[7:10], models[2]),
+            gtsam.PriorFactorConstantBias(bias, constant_bias(prior.mean), models[3]),
+        ]
+
+    def _container(self) -> Any:
+        """The whole prior as rows about its mean, which GTSAM's chart meets to first order."""
+        prior, unit = self.problem.model.prior, gtsam.noiseModel.Unit.Create(15)
         values = gtsam.Values()
         self.insert(values, 0, prior.mean)
-        if np.abs(rest).max() > 1e-12 * np.abs(cov).max():
-            root = np.linalg.inv(np.linalg.cholesky(cov))
-            unit = gtsam.noiseModel.Unit.Create(15)
-            blocks = [part for key, s in zip(self.keys(0), spans, strict=True) for part in (key, root[:, s])]
-            return [gtsam.LinearContainerFactor(gtsam.JacobianFactor(*blocks, np.zeros(15), unit), values)]
-        pose, velocity, bias = (noise_model(cov[s, s]) for s in spans)
-        return [
-            gtsam.PriorFactorPose3(X(0), values.atPose3(X(0)), pose),
-            gtsam.PriorFactorVector(V(0), prior.mean[7:10], velocity),
-            gtsam.PriorFactorConstantBias(B(0), values.atConstantBias(B(0)), bias),
-        ]
+        turn = to_world(prior.mean)
+        root = np.linalg.inv(np.linalg.cholesky(turn @ prior.cov @ turn.T))
+        spans = (slice(0, 6), slice(6, 9), slice(9, 15))
+        blocks = [part for key, s in zip(self.keys(0), spans, strict=True) for part in (key, root[:, s])]
+        return gtsam.LinearContainerFactor(gtsam.JacobianFactor(*blocks, np.zeros(15), unit), values)
 
     def move(self, k: int, x: Array) -> tuple[list[Any], Array]:
         """Preintegrate the samples that lead to node k."""
-        bias = gtsam.imuBias.ConstantBias(x[10:13], x[13:16])
+        bias = constant_bias(x)
         pim = gtsam.PreintegratedCombinedMeasurements(self.parameters, bias)
         integrate, accel, gyro, dt = pim.integrateMeasurement, self.accel, self.gyro, self.dt
         for s in range(self.pointer[k], self.pointer[k + 1]):
@@ -139,6 +151,11 @@ def to_world(x: Array) -> Array:
 def pose3(x: Array) -> Any:
     """`gtsam.Pose3` of a state that begins with quaternion and position."""
     return gtsam.Pose3(gtsam.Rot3.Quaternion(x[0], x[1], x[2], x[3]), x[4:7])
+
+
+def constant_bias(x: Array) -> Any:
+    """`gtsam.imuBias.ConstantBias` of a state that ends with both biases."""
+    return gtsam.imuBias.ConstantBias(x[10:13], x[13:16])
 
 
 def flat_pose(pose: Any) -> Array:
