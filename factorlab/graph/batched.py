@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from factorlab.graph.keys import STATIC, X
 from factorlab.graph.solve import Solved, certain_move, newton_decrement, readable
 from sequential.compile import compiled
+from sequential.errors import ModelError
+from sequential.model import evaluate
 from sequential.timeline import Problem, sealed
 
 __all__ = ["ChainGraph", "static_directions"]
@@ -24,6 +26,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 HALVINGS = 12
+SLACK = 1e-6  # share of the cost by which a step may raise it
 
 
 def static_directions(problem: Problem) -> tuple[Ints, Ints]:
@@ -33,6 +36,27 @@ def static_directions(problem: Problem) -> tuple[Ints, Ints]:
     for name in model.static:
         fixed[model.manifold.tangent(name)] = True  # type: ignore[attr-defined]
     return sealed(np.flatnonzero(~fixed)), sealed(np.flatnonzero(fixed))
+
+
+def require_still(problem: Problem) -> None:
+    """Refuse a static part that the process noise moves: a filter would let it walk, a graph would not.
+
+    Raises
+    ------
+    ModelError
+    """
+    model, f = problem.model, problem.model.process_functions
+    d = model.manifold.dim
+    if f.noise is None or not model.static:
+        return
+    noise = evaluate(f.noise, model.prior.mean, np.zeros(max(f.inputs, 1)), 1.0, f.params, d * d)
+    for name in model.static:
+        part = model.manifold.tangent(name)  # type: ignore[attr-defined]
+        if noise.reshape(d, d)[part, part].any():
+            msg = (
+                f"{name!r} is declared static, but the process gives it noise; make that zero, or let it move"
+            )
+            raise ModelError(msg)
 
 
 @dataclass(eq=False)
@@ -45,6 +69,7 @@ class ChainGraph:
         from sequential.kernels.linearize import Rows
 
         self.moving, self.static = static_directions(self.problem)
+        require_still(self.problem)
         self.whole = compiled(self.problem.model)
         dims = np.array([s.manifold.dim for s in self.problem.model.sensors.values()] or [0])
         plan, p = self.problem.schedule, len(self.moving)
@@ -121,25 +146,33 @@ class ChainGraph:
         ------
         UnderConstrainedError, NotConvergedError, ModelError
         """
-        trajectory, cost, iteration = start, self.linearise(start), 0
+        trajectory, iteration = np.array(start), 0
+        for name in self.problem.model.static:
+            part = self.problem.model.manifold.storage(name)  # type: ignore[attr-defined]
+            trajectory[:, part] = trajectory[-1, part]
+        cost = self.linearise(trajectory)
         while iteration < max_iterations:
             iteration += 1
             delta = self.step(self.linear_graph())
             trajectory, reached = self._descend(trajectory, cost, delta)
             gained, cost = cost - reached, reached
-            if np.abs(delta).max() < tolerance or gained < 1e-3 * tolerance * max(1e-12, cost):
+            if np.abs(delta).max() < tolerance or abs(gained) < 1e-3 * tolerance * max(1e-12, cost):
                 break
         decrement = newton_decrement(self.linear_graph(), self.problem, self.ordering)
         solved = Solved(trajectory, cost, iteration, decrement)
         return solved.checked() if check else solved
 
     def _descend(self, trajectory: Array, cost: float, delta: Array) -> tuple[Array, float]:
-        """Go by the step, halved until the cost does not rise; stay where it will not."""
+        """Go by the step, halved until the cost does not rise; stay where it will not.
+
+        A process whose noise depends on the state changes its weights with every step, which can raise the
+        cost a little on the way to where Gauss-Newton rests.
+        """
         scale = 1.0
         for _ in range(HALVINGS):
             trial = self.problem.model.manifold.retract(trajectory, scale * delta)
             reached = self.linearise(trial)
-            if reached <= cost * (1 + 1e-12) + 1e-12:
+            if reached <= cost + SLACK * (1.0 + cost):
                 return trial, reached
             scale /= 2
         return trajectory, self.linearise(trajectory)
