@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 
 def predict(problem: Problem, mean: Array, cov: Array) -> tuple[Array, Array]:
-    """Carry each node's estimate to the next: means (K, n) and covariances (K, d, d); entry 0 is the prior."""
+    """Carry each node to the next: means (K, n) and covariances (K, d, d); entry 0 is the prior."""
     from sequential.kernels.linearize import walk
 
     whole, prior = compiled(problem.model), problem.model.prior
-    arrived, transition, noise = np.empty_like(mean), np.empty_like(cov), np.empty_like(cov)
+    arrived, transition, noise = np.empty(mean.shape), np.empty(cov.shape), np.empty(cov.shape)
     walk(whole.tables, problem.schedule, np.ascontiguousarray(mean), arrived, transition, noise)
     whole.raise_failures()
     before = np.empty_like(cov)

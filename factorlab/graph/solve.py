@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import gtsam
-import numpy as np
 
 from factorlab.graph.keys import name_of
 from sequential.errors import ModelError, NotConvergedError, SolverError, UnderConstrainedError
@@ -17,6 +16,8 @@ from sequential.timeline import Problem
 
 __all__ = ["Solved", "certain_move", "newton_decrement", "optimise", "readable"]
 
+ENOUGH = 1e-6  # share of (1 + cost): a smaller promise ends Gauss-Newton
+ROUNDING = 1e-10
 SETTLED = 1e-3  # share of (1 + cost) that one more Gauss-Newton step may still promise
 WORDS = {
     "x": "the pose",
@@ -133,19 +134,30 @@ def optimise(
     UnderConstrainedError, NotConvergedError, SolverError
     """
     with readable(problem):
-        parameters = gtsam.GaussNewtonParams()
-        parameters.setMaxIterations(max_iterations)
-        parameters.setRelativeErrorTol(1e-9)
-        parameters.setAbsoluteErrorTol(1e-9)
-        optimizer = gtsam.GaussNewtonOptimizer(graph, start, parameters)
-        before = graph.error(start)
-        values = optimizer.optimize()
-        cost, iterations = optimizer.error(), optimizer.iterations()
-        if not np.isfinite(cost) or cost > before:
+        solved = gauss_newton(graph, start, max_iterations)
+        if solved is None:
             values, cost, iterations = damped(graph, start, max_iterations)
-        linear = graph.linearize(values)
-    solved = Solved(values, cost, iterations, newton_decrement(linear, problem))
+            solved = Solved(values, cost, iterations, newton_decrement(graph.linearize(values), problem))
     return solved.checked() if check else solved
+
+
+def gauss_newton(graph: Any, values: Any, max_iterations: int) -> Solved | None:
+    """Gauss-Newton until a step promises next to nothing; None where a step would raise the cost.
+
+    The loop is ours and all the work GTSAM's: each solve proves full rank and prices its own step, so that
+    no further solve is needed to judge the result.
+    """
+    cost, decrement, iteration = graph.error(values), float("inf"), 0
+    while iteration < max_iterations and decrement > ENOUGH * (1.0 + cost):
+        linear = graph.linearize(values)
+        step = linear.optimize()
+        decrement = float(linear.error(gtsam.VectorValues.Zero(step)) - linear.error(step))
+        values = values.retract(step)
+        before, cost = cost, graph.error(values)
+        iteration += 1
+        if not cost <= before * (1.0 + ROUNDING) + ROUNDING:
+            return None
+    return Solved(values, cost, iteration, decrement)
 
 
 def damped(graph: Any, start: Any, max_iterations: int) -> tuple[Any, float, int]:

@@ -16,15 +16,13 @@ Isotropic = gtsam.noiseModel.Isotropic.Sigma
 
 
 class Drive:
-    """KITTI's arrays as lists, ready for a Python loop, with the noise as shipped."""
+    """KITTI's arrays, with the noise as shipped.  Like ours, each peer starts from arrays when timed."""
 
     def __init__(self, problem: Problem) -> None:
         plan, model = problem.schedule, problem.model
-        self.pointer = plan.step_ptr.tolist()
-        driven = plan.inputs[plan.step_input]
-        self.samples = list(
-            zip(list(driven[:, 3:6]), list(driven[:, :3]), plan.step_dt.tolist(), strict=True)
-        )
+        self.pointer, self.dt = plan.step_ptr, plan.step_dt
+        self.accel = np.array(plan.inputs[plan.step_input, :3])
+        self.gyro = np.array(plan.inputs[plan.step_input, 3:6])
         node = np.searchsorted(problem.t, problem.reading_t)
         self.fixes = {int(k): plan.z[r, :3] for r, k in enumerate(node)}
         self.nodes = len(problem.t)
@@ -42,11 +40,12 @@ class Drive:
         parameters.setIntegrationCovariance(np.zeros((3, 3)))
         start = gtsam.NavState(self.pose, self.velocity)
         ekf = gtsam.NavStateImuEKF(start, np.array(self.prior.cov[:9, :9]), parameters)
-        predict, samples, pointer = ekf.predict, self.samples, self.pointer
+        gyro, accel, dt = list(self.gyro), list(self.accel), self.dt.tolist()
+        predict, pointer = ekf.predict, self.pointer.tolist()
         noise, positions = np.eye(3) * self.variance, []
         for k in range(self.nodes):
             for s in range(pointer[k], pointer[k + 1]):
-                predict(*samples[s])
+                predict(gyro[s], accel[s], dt[s])
             if k in self.fixes:
                 state = ekf.state()
                 jacobian = np.zeros((3, 9))
@@ -63,6 +62,8 @@ class Drive:
         parameters.setIntegrationCovariance(np.eye(3) * 1e-16)
         parameters.setBiasAccCovariance(np.eye(3) * self.noise.accel_bias_walk**2)
         parameters.setBiasOmegaCovariance(np.eye(3) * self.noise.gyro_bias_walk**2)
+        gyro, accel, dt = list(self.gyro), list(self.accel), self.dt.tolist()
+        pointer = self.pointer.tolist()
         sigmas, bias = np.sqrt(np.diag(self.prior.cov)), gtsam.imuBias.ConstantBias()
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         graph.add(gtsam.PriorFactorPose3(X(0), self.pose, Sigmas(sigmas[:6])))
@@ -72,9 +73,8 @@ class Drive:
         for k in range(self.nodes):
             if k:
                 pim = gtsam.PreintegratedCombinedMeasurements(parameters, bias)
-                for s in range(self.pointer[k], self.pointer[k + 1]):
-                    gyro, accel, dt = self.samples[s]
-                    pim.integrateMeasurement(accel, gyro, dt)
+                for s in range(pointer[k], pointer[k + 1]):
+                    pim.integrateMeasurement(accel[s], gyro[s], dt[s])
                 graph.add(gtsam.CombinedImuFactor(X(k - 1), V(k - 1), X(k), V(k), B(k - 1), B(k), pim))
                 state = pim.predict(state, bias)
             if k in self.fixes:

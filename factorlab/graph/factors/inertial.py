@@ -98,8 +98,9 @@ class InertialGraph(NativeGraph):
         bias = constant_bias(x)
         pim = gtsam.PreintegratedCombinedMeasurements(self.parameters, bias)
         integrate, accel, gyro, dt = pim.integrateMeasurement, self.accel, self.gyro, self.dt
-        for s in range(self.pointer[k], self.pointer[k + 1]):
-            integrate(accel[s], gyro[s], dt[s])
+        span = slice(self.pointer[k], self.pointer[k + 1])
+        for force, rate, interval in zip(accel[span], gyro[span], dt[span], strict=True):
+            integrate(force, rate, interval)
         factor = gtsam.CombinedImuFactor(X(k - 1), V(k - 1), X(k), V(k), B(k - 1), B(k), pim)
         arrived = pim.predict(gtsam.NavState(pose3(x), x[7:10]), bias)
         return [factor], np.concatenate([flat_pose(arrived.pose()), arrived.velocity(), x[10:]])

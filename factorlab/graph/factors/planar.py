@@ -97,7 +97,7 @@ class PlanarGraph(NativeGraph):
     def covariance(self, source: Any, k: int, x: Array) -> Array:
         """Pose and bias together; Pose2's chart is ours."""
         if self.bias is None:
-            return np.asarray(source.marginalCovariance(X(k)))
+            return np.ascontiguousarray(source.marginalCovariance(X(k)))
         joint = joint_blocks(source, [X(k), S(0)])
         order = [*range(self.pose, self.pose + 3), self.bias]
         inverse = np.argsort(order)
