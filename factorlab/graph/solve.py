@@ -16,7 +16,7 @@ from sequential.timeline import Problem
 
 __all__ = ["Solved", "certain_move", "newton_decrement", "optimise", "readable"]
 
-ENOUGH = 1e-6  # share of (1 + cost): a smaller promise ends Gauss-Newton
+ENOUGH = 1e-9  # share of (1 + cost): a smaller promise ends Gauss-Newton
 ROUNDING = 1e-10
 SETTLED = 1e-3  # share of (1 + cost) that one more Gauss-Newton step may still promise
 WORDS = {
