@@ -13,9 +13,9 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from by_hand import Drive, range_chain
-from chain import BEACONS, make
-from figures import Figure, interleaved, publish, say
+from measure.by_hand import Drive, range_chain
+from measure.chain import BEACONS, make
+from measure.figures import Figure, interleaved, publish, say
 
 import sequential as sq
 from factorlab.compare import compare
