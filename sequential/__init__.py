@@ -40,7 +40,7 @@ from sequential.models import (
 from sequential.noise import ImuNoise, diagonal
 from sequential.run import Estimator, run
 from sequential.simulate import Simulation, simulate
-from sequential.smoothers import IteratedSmoother, RauchTungStriebel
+from sequential.smoothers import FixedLagSmoother, IteratedSmoother, RauchTungStriebel
 from sequential.timeline import Problem, prepare
 from sequential.tuning import Knob, Tuning, tune
 
@@ -54,6 +54,7 @@ __all__ = [
     "Estimator",
     "ExtendedKalmanFilter",
     "FactorlabError",
+    "FixedLagSmoother",
     "Gaussian",
     "ImuNoise",
     "Innovations",

@@ -39,6 +39,9 @@ class _Files(NamedTuple):
     sigmas: Array  # (5,) accelerometer, gyro, integration, accelerometer bias, gyro bias
 
 
+ESTIMATORS = ("ekf", "iekf", "ukf", "ekf_rts", "ieks", "fixed_lag", "isam2", "isam2_final", "batch")
+
+
 def load_kitti(use_every: int, data: Path | None) -> Dataset:
     """IMU at 100 Hz, fixes at 1 Hz of which one in `use_every` is used and the others score the result."""
     files = _read(data)
@@ -73,7 +76,7 @@ def load_kitti(use_every: int, data: Path | None) -> Dataset:
             "start: position and heading from the second fix and the first 3 m of motion",
             "held-out fixes carry the receiver's own noise (σ about 0.26 m as declared)",
         ),
-        default_estimators=("ekf", "iekf", "ukf", "ekf_rts", "ieks", "fixed_lag", "isam2", "isam2_final", "batch"),
+        default_estimators=ESTIMATORS,
     )
 
 

@@ -11,16 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.native import NativeGraph, native_graph
-from factorlab.graph.online import predicted_innovations
 from factorlab.graph.solve import readable
 from sequential.errors import ModelError
 from sequential.history import Report, Run
+from sequential.smoothers import FixedLagSmoother
 from sequential.smoothers.leave_one_out import leave_one_out
+from sequential.smoothers.online import predicted_innovations
 from sequential.timeline import Problem
 
 __all__ = ["FixedLagGraph", "IncrementalGraph"]
 
 Array = NDArray[np.float64]
+
+
+NOT_NATIVE = "no native factors: the windows were solved by the chain solver"
 
 
 def isam_parameters(threshold: float) -> Any:
@@ -37,7 +41,7 @@ def require_native(problem: Problem, name: str) -> NativeGraph:
     if native is None:
         msg = (
             f"{name} needs native GTSAM factors, which this model's process or sensors do not have; "
-            "use BatchGraph() or IteratedSmoother()"
+            "use FixedLagGraph(), BatchGraph() or IteratedSmoother()"
         )
         raise ModelError(msg)
     return native
@@ -90,6 +94,8 @@ class IncrementalGraph:
 class FixedLagGraph:
     """The last `lag` seconds as a graph; gtsam's IncrementalFixedLagSmoother marginalises what is older.
 
+    A model without native factors goes to `sequential.FixedLagSmoother`, which solves the same windows.
+
     Parameters
     ----------
     lag : s
@@ -102,7 +108,10 @@ class FixedLagGraph:
 
     def solve(self, problem: Problem) -> Run:
         """Online estimate at each node."""
-        native = require_native(problem, "a fixed-lag graph")
+        native = native_graph(problem)
+        if native is None:
+            run = FixedLagSmoother(self.lag).solve(problem)
+            return replace(run, report=replace(run.report, message=NOT_NATIVE))
         engine = gtsam.IncrementalFixedLagSmoother(self.lag, isam_parameters(self.threshold))
         mean, cov, seconds = walk(problem, native, engine.update, engine, stamped=True)
         return online_run(problem, mean, cov, self.name, seconds)

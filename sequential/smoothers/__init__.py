@@ -1,6 +1,7 @@
 """Smoothers: what the whole log says about each moment of it."""
 
+from sequential.smoothers.fixed_lag import FixedLagSmoother
 from sequential.smoothers.iterated import IteratedSmoother
 from sequential.smoothers.rauch_tung_striebel import RauchTungStriebel
 
-__all__ = ["IteratedSmoother", "RauchTungStriebel"]
+__all__ = ["FixedLagSmoother", "IteratedSmoother", "RauchTungStriebel"]

@@ -89,7 +89,7 @@ def dataset_of(model, log, t, states):
 @pytest.fixture
 def files(tmp_path, rng):
     """A folder with `walk.csv`, `truth.tum` and `walker.py`."""
-    model, log, t, states = walk(rng)
+    _model, log, t, states = walk(rng)
     write_log(tmp_path / "walk.csv", log)
     write_tum(tmp_path / "truth.tum", Trajectory(t, states[:, :2]))
     (tmp_path / "walker.py").write_text(textwrap.dedent(MODEL_FILE), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Innovations of an online graph: each reading against what the estimate before it predicts."""
+"""Innovations of an online smoother or graph: each reading against what the estimate before it predicts."""
 
 from __future__ import annotations
 

@@ -1,0 +1,129 @@
+"""An online smoother: the last few seconds of the chain are solved anew at every node."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.compile import compiled
+from sequential.filters.solution import require_finite, require_solved
+from sequential.history import Report, Run
+from sequential.manifold import Vector
+from sequential.smoothers.online import predicted_innovations
+from sequential.timeline import Problem
+
+__all__ = ["FixedLagSmoother"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class FixedLagSmoother:
+    """Gauss-Newton on a window of the chain; what leaves the window lives on as the window's prior.
+
+    Takes any model, and gives the online estimate: what is known at each node when its readings arrive.
+    With a lag longer than the log it is the batch, solved again at every node.
+
+    Parameters
+    ----------
+    lag : length of the window, s; infinity keeps everything, at a cost that grows with the square of the log
+    max_iterations, tolerance : of Gauss-Newton in each window; the tolerance is in standard deviations
+    """
+
+    lag: float = 5.5
+    max_iterations: int = 10
+    tolerance: float = 1e-3
+    name = "fixed_lag"
+
+    def solve(self, problem: Problem) -> Run:
+        """Online estimate at each node."""
+        began = time.perf_counter()
+        window = _Window(problem)
+        nodes, model = len(problem.t), problem.model
+        mean = np.empty((nodes, model.manifold.size))
+        cov = np.empty((nodes, model.manifold.dim, model.manifold.dim))
+        oldest = np.searchsorted(problem.t, problem.t - self._lag_ns(problem))
+        for k in range(nodes):
+            window.grow(k, int(oldest[k]))
+            window.settle(self.max_iterations, self.tolerance)
+            mean[k], cov[k] = window.states[k], window.cov[-1]
+        require_finite(problem, mean)
+        seconds = time.perf_counter() - began
+        report = Report(self.name, iterations=window.solves, seconds=seconds, message=window.whole.message())
+        innovations = predicted_innovations(problem, mean, cov)
+        return Run(problem.t, mean, cov, model.manifold, innovations, float("nan"), report)
+
+    def _lag_ns(self, problem: Problem) -> int:
+        whole = int(problem.t[-1] - problem.t[0]) + 1
+        return whole if self.lag * 1e9 >= whole else round(self.lag * 1e9)
+
+
+class _Window:
+    """Nodes first..last of a problem, with the belief about node `first` from all that came before it."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.whole = problem, compiled(problem.model)
+        self.first = self.last = self.solves = 0
+        self.prior_mean, self.prior_cov = problem.model.prior.mean, problem.model.prior.cov
+        self.states = np.tile(self.prior_mean, (len(problem.t), 1))
+        self.flat = Vector(self.whole.tables.d).table()
+        self.linearised: Any = None
+        self.about = self.states[:1]
+        self.cov = np.empty((0, 0, 0))
+
+    def plan(self, first: int, last: int) -> Any:
+        """The schedule of some nodes: pointers are cut, what they point at stays."""
+        plan, span = self.problem.schedule, slice(first, last + 2)
+        return plan._replace(step_ptr=plan.step_ptr[span], reading_ptr=plan.reading_ptr[span])
+
+    def grow(self, node: int, oldest: int) -> None:
+        """Let a node in, where the one before it leads, and let those before `oldest` go."""
+        from sequential.kernels.linearize import walk
+
+        if node > 0:
+            n, d = self.whole.tables.n, self.whole.tables.d
+            arrived, square = np.empty((2, n)), np.empty((2, d, d))
+            walk(
+                self.whole.tables, self.plan(node - 1, node), self.states[node - 1 : node + 1],
+                arrived, square, np.empty((2, d, d)),
+            )  # fmt: skip
+            self.states[node] = arrived[1]
+        if (leaving := min(oldest, self.last) - self.first) > 0:
+            self._hand_over(leaving)
+        self.last = node
+
+    def _hand_over(self, leaving: int) -> None:
+        """Make the belief that some nodes leave behind the prior of the next one, in its own tangent."""
+        manifold, step = self.problem.model.manifold, self.linearised.predicted_mean[leaving]
+        self.prior_mean = manifold.retract(self.about[leaving], step)
+        _, inverse = manifold.transport(self.about[leaving], self.prior_mean)
+        self.prior_cov = inverse @ self.linearised.predicted_cov[leaving] @ inverse.T
+        self.first += leaving
+
+    def settle(self, max_iterations: int, tolerance: float) -> None:
+        """Gauss-Newton over the window."""
+        from sequential.kernels.iterated import Linearised, filter_steps
+        from sequential.kernels.smoothing import smooth_history
+
+        count, d = self.last - self.first + 1, self.whole.tables.d
+        shapes = ((count, d), (count, d, d), (count, d), (count, d, d), (count, d, d))
+        out = Linearised(*map(np.empty, shapes))
+        delta, cov = np.empty((count, d)), np.empty((count, d, d))
+        inside = slice(self.first, self.last + 1)
+        plan = self.plan(self.first, self.last)
+        for _ in range(max_iterations):
+            about = self.states[inside].copy()
+            failed = filter_steps(self.whole.tables, plan, self.prior_mean, self.prior_cov, about, out)
+            self.whole.raise_failures()
+            require_solved(self.problem, failed)
+            smooth_history(self.flat, *out, 1, delta, cov)
+            self.states[inside] = self.problem.model.manifold.retract(about, delta)
+            self.about, self.linearised, self.cov = about, out, cov
+            self.solves += 1
+            sigmas = np.sqrt(np.diagonal(cov, axis1=1, axis2=2).clip(1e-300))
+            if np.max(np.abs(delta) / sigmas) <= tolerance:
+                return
