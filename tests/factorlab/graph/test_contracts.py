@@ -38,7 +38,7 @@ def our_system(chain, rows, *parts):
     return a.T @ a, a.T @ chain.rows.right[rows]
 
 
-def assert_same_system(theirs, ours, tolerance=1e-6):
+def assert_same_system(theirs, ours, tolerance=1e-7):
     information, right = ours
     size = len(right)
     scale = np.sqrt(np.diag(information)) + 1e-9
@@ -64,20 +64,27 @@ def anywhere(problem, rng, spread):
 @pytest.mark.parametrize("make", PLANAR, ids=lambda make: make.__name__)
 def test_planar_factors_are_our_rows(make, loss, rng):
     problem = make(loss).problem(rng)
-    native, chain = native_graph(problem), ChainGraph(problem)
+    native, chain, manifold = native_graph(problem), ChainGraph(problem), problem.model.manifold
     for _ in range(3):  # times 41 nodes: over a hundred random points
         trajectory = anywhere(problem, rng, 0.4)
         cost = chain.linearise(trajectory)
         graph, values = build(native, trajectory)
         assert graph.error(values) == pytest.approx(cost, rel=1e-9)
         for k in range(1, len(trajectory)):
-            factors = native.move(k, trajectory[k - 1])[0] + native.reading_factors(k)
-            keys = native.keys(k - 1) + native.keys(k)
-            parts = [chain.rows.before, chain.rows.here]
-            if problem.model.static and problem.schedule.reading_ptr[k + 1] > problem.schedule.reading_ptr[k]:
-                keys, parts = [*keys, S(0)], [*parts, chain.rows.fixed]
-            rows = slice(chain.rows.first[k], chain.rows.first[k + 1])
-            assert_same_system(native_system(factors, values, keys), our_system(chain, rows, *parts))
+            first, last = chain.rows.first[k : k + 2]
+            middle = first + len(chain.moving)
+            before, here, fixed = chain.rows.before, chain.rows.here, chain.rows.fixed
+            move, arrived = native.move(k, trajectory[k - 1])
+            ours = our_system(chain, slice(first, middle), before, here)
+            turned = manifold.local(arrived, trajectory[k])[2]
+            if abs(turned) > 0.02:  # below, GTSAM's derivative of Pose2's logarithm loses digits
+                theirs = native_system(move, values, native.keys(k - 1) + native.keys(k))
+                assert_same_system(theirs, ours)
+            keys, parts = native.keys(k), [here]
+            if problem.model.static:
+                keys, parts = [*keys, S(0)], [here, fixed]
+            ours = our_system(chain, slice(middle, last), *parts)
+            assert_same_system(native_system(native.reading_factors(k), values, keys), ours)
 
 
 @every_loss

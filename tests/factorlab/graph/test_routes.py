@@ -60,13 +60,14 @@ def test_inertial_routes_agree(arm, loss, rng):
 @every_loss
 def test_a_correlated_prior_is_one_container(loss, rng):
     mixed = rng.standard_normal((15, 15))
-    correlation = mixed @ mixed.T
+    correlation = mixed @ mixed.T + 5.0 * np.eye(15)
     correlation /= np.sqrt(np.outer(np.diag(correlation), np.diag(correlation)))
     sigmas = 0.1 * np.sqrt(np.diag(inertial().model.prior.cov))
     problem = inertial(loss=loss, prior_cov=np.outer(sigmas, sigmas) * correlation).problem(rng)
     factors = native_graph(problem).prior_factors()
     assert [type(factor) for factor in factors] == [gtsam.LinearContainerFactor]
-    assert_same(NATIVE.solve(problem), BATCHED.solve(problem), 1e-3, 1e-2)
+    # Rows about the prior's mean, met along SE(3)'s exponential: exact to first order in the correction.
+    assert_same(NATIVE.solve(problem), BATCHED.solve(problem), 5e-3, 3e-2)
 
 
 @pytest.mark.parametrize("make", [*PLANAR, inertial], ids=lambda make: make.__name__)
