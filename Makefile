@@ -25,7 +25,9 @@ help:
 	@echo "make bench   every benchmark, and the slow tests with all their seeds"
 	@echo "make clean   remove .venv, builds and caches"
 
-demo: $(VENV)/installed warm
+# only what the demo runs on is compiled for it
+demo: $(VENV)/installed
+	@$(BIN)/python -m sequential.warm_up extended unscented iterated smoothing looking walking inertial position
 	@$(BIN)/factorlab demo
 
 test: $(VENV)/installed-test warm

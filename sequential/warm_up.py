@@ -1,6 +1,7 @@
-"""Compile every kernel and built-in model once, so that first runs are quick: `python -m sequential.warm_up`.
+"""Compile every kernel and built-in model once, so that first runs are quick.
 
-Two processes share the work, each writing to the same disk cache; what is cached already costs a second.
+`python -m sequential.warm_up` makes everything, `python -m sequential.warm_up extended inertial` some rooms
+only.  Two processes share the work, each writing to the same disk cache; what is cached costs a second.
 """
 
 from __future__ import annotations
@@ -12,23 +13,41 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from typing import Any
 
+from sequential.errors import ModelError
+
 __all__ = ["warm_up"]
 
 # Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
 SMALL = ("matrices", "poses", "charts", "belief", "sensing")
-KERNELS = ("extended", "unscented", "iterated", "linearize", "smoothing", "looking")
+KERNELS = ("extended", "unscented", "iterated", "linearize", "smoothing", "looking", "walking")
 MODELS = ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared")
 
 
-def warm_up(progress: Callable[[str], object] = lambda _: None) -> None:
-    """Compile whatever is not in the cache yet; `progress` hears what has just been made."""
+def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> None:
+    """Compile whatever is not in the cache yet.
+
+    Parameters
+    ----------
+    progress : hears what has just been made
+    rooms : names of kernels and of rooms of models; all of them by default
+
+    Raises
+    ------
+    ModelError
+        where there is no such room.
+    """
+    wanted = rooms or (*KERNELS, *MODELS)
+    if unknown := [room for room in wanted if room not in (*KERNELS, *MODELS)]:
+        msg = f"there is nothing to compile in {unknown[0]!r}; there are {', '.join((*KERNELS, *MODELS))}"
+        raise ModelError(msg)
     for name in SMALL:
         importlib.import_module(f"sequential.kernels.{name}")
     progress("small matrices and charts")
-    workers = max(1, min(len(os.sched_getaffinity(0)), len(KERNELS)))
+    workers = max(1, min(len(os.sched_getaffinity(0)), len(wanted)))
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = {pool.submit(compile_kernel, name): f"kernel {name}" for name in KERNELS}
-        jobs |= {pool.submit(compile_models, name): f"models {name}" for name in MODELS}
+        # in the order of KERNELS, the longest first
+        jobs = {pool.submit(compile_kernel, name): f"kernel {name}" for name in KERNELS if name in wanted}
+        jobs |= {pool.submit(compile_models, name): f"models {name}" for name in MODELS if name in wanted}
         for job in as_completed(jobs):
             job.result()
             progress(jobs[job])
@@ -58,4 +77,4 @@ def is_raw(function: Any) -> bool:
 if __name__ == "__main__":
     import sys
 
-    warm_up(lambda what: sys.stderr.write(f"compiled {what}\n"))
+    warm_up(lambda what: sys.stderr.write(f"compiled {what}\n"), *sys.argv[1:])

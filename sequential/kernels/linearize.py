@@ -28,7 +28,7 @@ from sequential.kernels.matrices import (
 from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, scratch_size, sensor_jacobian
 
-__all__ = ["ROWS", "Rows", "linearise_chain", "walk"]
+__all__ = ["ROWS", "Rows", "linearise_chain"]
 
 CAUCHY = 2
 
@@ -219,27 +219,3 @@ def linearise_chain(model, plan, prior_mean, prior_cov, trajectory, moving, stat
         model, plan, (prior_mean, prior_cov), trajectory, states, moving, static, belief, x, q, frames,
         np.empty(d), work, update, rows,
     )  # fmt: skip
-
-
-@bare
-def walk_nodes(model, plan, trajectory, belief, x, q, phi, work, arrived, transition, noise):
-    """The loop of `walk`, with every array at hand."""
-    for node in range(len(plan.reading_ptr) - 1):
-        copy_vector(trajectory[max(node - 1, 0)], x)
-        fill_diagonal(q, 0.0)
-        fill_diagonal(phi, 1.0)
-        if node > 0:
-            predict(model, plan, node, belief, x, q, phi, 1, work)
-        copy_vector(x, arrived[node])
-        copy_matrix(phi, transition[node])
-        copy_matrix(q, noise[node])
-
-
-@njit(types.void(MODEL, SCHEDULE, f2, _f2, _f3, _f3), cache=True, error_model="numpy")
-def walk(model, plan, trajectory, arrived, transition, noise):
-    """From each node's state to the next node: arrival (K, n), Φ and Q (K, d, d); entry 0 stands still."""
-    n, d = model.n, model.d
-    belief = np.empty(n + d * d)
-    x, q, phi = belief[:n], belief[n:].reshape((d, d)), np.empty((d, d))
-    work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
-    walk_nodes(model, plan, trajectory, belief, x, q, phi, work, arrived, transition, noise)

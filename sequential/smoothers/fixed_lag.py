@@ -82,7 +82,7 @@ class _Window:
 
     def grow(self, node: int, oldest: int) -> None:
         """Let a node in, where the one before it leads, and let those before `oldest` go."""
-        from sequential.kernels.linearize import walk
+        from sequential.kernels.walking import walk
 
         if node > 0:
             n, d = self.whole.tables.n, self.whole.tables.d

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 def predict(problem: Problem, mean: Array, cov: Array) -> tuple[Array, Array]:
     """Carry each node to the next: means (K, n) and covariances (K, d, d); entry 0 is the prior."""
-    from sequential.kernels.linearize import walk
+    from sequential.kernels.walking import walk
 
     whole, prior = compiled(problem.model), problem.model.prior
     arrived, transition, noise = np.empty(mean.shape), np.empty(cov.shape), np.empty(cov.shape)

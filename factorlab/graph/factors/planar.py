@@ -121,7 +121,7 @@ def layout(manifold: Manifold) -> tuple[int, int | None]:
 
 def odometry(problem: Problem) -> tuple[Array, Array]:
     """Composed motion (K, 3) and its covariance (K, 3, 3) between nodes: the same from any pose."""
-    from sequential.kernels.linearize import walk
+    from sequential.kernels.walking import walk
 
     whole, manifold = compiled(problem.model), problem.model.manifold
     at, nodes, d = layout(manifold)[0], len(problem.t), manifold.dim
