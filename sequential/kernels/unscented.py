@@ -17,10 +17,10 @@ from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2
 from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
-from sequential.kernels.call import call
+from sequential.kernels.call import bare, call
 from sequential.kernels.charts import local, retract
 from sequential.kernels.extended import FILTERED, FINISHED
-from sequential.kernels.matrices import multiply
+from sequential.kernels.matrices import copy_matrix, copy_vector, multiply
 from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight
 
@@ -32,7 +32,7 @@ LOST = 1e-13  # a pivot below this share of its diagonal is rounding: a directio
 INDEFINITE = -1e-6  # and one that is this negative is not
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def spread(p, d, gamma, lower, steps):
     """Rows ±γ L_i of `steps` (2d, d) from P = L Lᵀ; returns False where P is not positive semi-definite."""
     for j in range(d):
@@ -57,7 +57,7 @@ def spread(p, d, gamma, lower, steps):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def mean_of(table, first, last, size, dim, count, points, weights, mean, tangents, move):
     """Mean of `count` + 1 points (row 0 central) about the central one, and the tangents there to all."""
     flat, out = points.reshape(-1), tangents.reshape(-1)
@@ -82,7 +82,7 @@ def mean_of(table, first, last, size, dim, count, points, weights, mean, tangent
             tangents[i, k] -= move[k]
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def second_moment(tangents, weights, count, dim, out):
     """out = Σ w e eᵀ over the central point and `count` others."""
     for a in range(dim):
@@ -95,7 +95,7 @@ def second_moment(tangents, weights, count, dim, out):
             out[b, a] = total
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def regress(tangents, lower, d, dim, gamma, out):
     """Slope A (dim, d) = D L⁻¹ / 2γ; a direction without uncertainty gets a zero column."""
     for r in range(dim):
@@ -109,7 +109,7 @@ def regress(tangents, lower, d, dim, gamma, out):
             out[r, j] = s / lower[j, j]
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def draw(model, x, p, weights, sigma):
     """Points x, x ⊕ γ L_i, x ⊕ -γ L_i into the rows of the first array of `sigma`."""
     points, _, _, steps, lower, _ = sigma
@@ -117,13 +117,13 @@ def draw(model, x, p, weights, sigma):
     if not spread(p, d, weights[0], lower, steps):
         return False
     flat, step = points.reshape(-1), steps.reshape(-1)
-    points[0, :] = x
+    copy_vector(x, points[0])
     for i in range(2 * d):
         retract(model.table, 0, blocks, x, 0, step, i * d, flat, (i + 1) * n)
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def predict(model, plan, node, x, p, phi, weights, keep, sigma, work):
     """Carry mean, covariance and (with `keep`) phi along the steps to a node; False where P is indefinite."""
     points, moved, tangents, _, lower, move = sigma
@@ -141,11 +141,11 @@ def predict(model, plan, node, x, p, phi, weights, keep, sigma, work):
         if keep != 0:
             regress(tangents, lower, d, d, weights[0], work[0])
             multiply(work[0], phi, work[1], d, d, d)
-            phi[:, :] = work[1]
+            copy_matrix(work[1], phi)
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
     """Regress a reading on the state: residual, slope H (m, d), Ω + R in `noise`; False: P indefinite."""
     points, lower = sigma[0], sigma[4]
@@ -176,7 +176,7 @@ def look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def absorb(model, plan, reading, x, p, weights, sigma, seen, update, work, out):
     """Update by one reading; returns its log likelihood, 0 if gated, NaN if S or P is indefinite."""
     h, cross, gain, innovation_cov, factor, noise, scaled, delta = update
