@@ -153,12 +153,16 @@ def _of_tail(seen: _Seen) -> Iterator[Finding]:
         f"{few.few} of {few.count} readings of {seen.name} carry {few.share:.0%} of the NIS, whose median is "
         f"{s.median:.2g} where {s.expected_median:.3g} is expected: {what}, not a level"
     )
-    advice = (
-        "look at what happens there that the model does not know"
-        if few.burst
-        else f"give {seen.name} a gate (0.999) or a loss (Loss('huber', 1.345)) before scaling its noise"
-    )
-    yield Finding("WARN", seen.name, "tail of the NIS", few.share, None, meaning, advice)
+    yield Finding("WARN", seen.name, "tail of the NIS", few.share, None, meaning, _tail_advice(seen, few))
+
+
+def _tail_advice(seen: _Seen, few: Tail) -> str:
+    if few.burst:
+        return "look at what happens there that the model does not know"
+    if seen.sensor.loss is not None:
+        kind, k = seen.sensor.loss.kind, seen.sensor.loss.k
+        return f"the {kind} loss of {seen.name} (k = {k:g}) weighs them down already; a smaller k does more"
+    return f"give {seen.name} a gate (0.999) or a loss (Loss('huber', 1.345)) before scaling its noise"
 
 
 def _gate_advice(name: str) -> str:

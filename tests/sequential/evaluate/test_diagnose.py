@@ -80,6 +80,13 @@ def test_outliers_are_not_a_level(rng):
     assert "where 2.37 is expected: outliers or bursts, not a level; give gps a gate" in str(few)
 
 
+def test_a_sensor_with_a_loss_is_not_told_to_get_one(rng):
+    white = 0.4 * rng.standard_normal((COUNT, 3))
+    white[::20] *= 30.0
+    (few,) = findings(run_of(white), model_of(loss=sq.Loss("cauchy", 2.0)), metric="tail of the NIS")
+    assert few.advice == "the cauchy loss of gps (k = 2) weighs them down already; a smaller k does more"
+
+
 def test_a_burst_is_dated(rng):
     white = 0.4 * rng.standard_normal((COUNT, 3))
     white[60:68] = 12.0
