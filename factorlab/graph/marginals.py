@@ -10,9 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.compile import compiled
-from sequential.filters.solution import require_solved
-from sequential.manifold import Vector
+from sequential.smoothers.chain import ChainPass
 from sequential.timeline import Problem
 
 __all__ = ["chain_marginals"]
@@ -27,16 +25,6 @@ def chain_marginals(problem: Problem, trajectory: Array) -> Array:
     ------
     NotPositiveDefiniteError
     """
-    from sequential.kernels.iterated import Linearised, filter_steps
-    from sequential.kernels.smoothing import smooth_history
-
-    whole, prior = compiled(problem.model), problem.model.prior
-    nodes, d = len(problem.t), whole.tables.d
-    out = Linearised(*(np.empty((nodes, d) if flat else (nodes, d, d)) for flat in (1, 0, 1, 0, 0)))
-    states = np.ascontiguousarray(trajectory)
-    failed = filter_steps(whole.tables, problem.schedule, prior.mean, prior.cov, states, out)
-    whole.raise_failures()
-    require_solved(problem, failed)
-    delta, cov = np.empty((nodes, d)), np.empty((nodes, d, d))
-    smooth_history(Vector(d).table(), *out, 1, delta, cov)
-    return cov
+    chain, prior = ChainPass(problem, problem.schedule), problem.model.prior
+    chain.solve(prior.mean, prior.cov, trajectory)
+    return chain.cov

@@ -104,6 +104,12 @@ class Solved:
         return self
 
 
+def priced_step(linear: Any, *ordering: Any) -> tuple[Any, float]:
+    """The Gauss-Newton step of a linear graph, and the cost that it promises to take off."""
+    step = linear.optimize(*ordering)
+    return step, float(linear.error(gtsam.VectorValues.Zero(step)) - linear.error(step))
+
+
 def newton_decrement(linear: Any, problem: Problem | None = None, *ordering: Any) -> float:
     """Cost that one more Gauss-Newton step promises to take off; it does not depend on units.
 
@@ -115,8 +121,7 @@ def newton_decrement(linear: Any, problem: Problem | None = None, *ordering: Any
     UnderConstrainedError
     """
     with readable(problem):
-        step = linear.optimize(*ordering)
-    return float(linear.error(gtsam.VectorValues.Zero(step)) - linear.error(step))
+        return priced_step(linear, *ordering)[1]
 
 
 def optimise(
@@ -149,9 +154,7 @@ def gauss_newton(graph: Any, values: Any, max_iterations: int) -> Solved | None:
     """
     cost, decrement, iteration = graph.error(values), float("inf"), 0
     while iteration < max_iterations and decrement > ENOUGH * (1.0 + cost):
-        linear = graph.linearize(values)
-        step = linear.optimize()
-        decrement = float(linear.error(gtsam.VectorValues.Zero(step)) - linear.error(step))
+        step, decrement = priced_step(graph.linearize(values))
         values = values.retract(step)
         before, cost = cost, graph.error(values)
         iteration += 1

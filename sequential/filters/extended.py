@@ -49,7 +49,8 @@ class IteratedExtendedKalmanFilter:
 
 def filter_problem(problem: Problem, name: str, iterations: int, *, keep: bool) -> Run:
     """Run the compiled filter and read its arrays."""
-    from sequential.kernels.extended import Filtered, filter_log
+    from sequential.kernels.extended import filter_log
+    from sequential.kernels.records import Filtered
 
     whole = compiled(problem.model)
     out = Filtered(*allocate(problem, whole.tables, keep=keep))

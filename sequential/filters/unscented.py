@@ -57,7 +57,7 @@ class UnscentedKalmanFilter:
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        from sequential.kernels.extended import Filtered
+        from sequential.kernels.records import Filtered
         from sequential.kernels.unscented import filter_sigma_points
 
         whole = compiled(problem.model)

@@ -20,7 +20,7 @@ INLINED = (
     "kernels/arrays.py",
     "kernels/belief.py",
     "kernels/call.py",
-    "kernels/extended.py",
+    "kernels/moving.py",
     "kernels/records.py",
     "kernels/matrices.py",
     "kernels/charts.py",

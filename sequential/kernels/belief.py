@@ -6,8 +6,8 @@ import math
 
 from numba import types
 
-from sequential.kernels.arrays import f0, f1, f2, i0, w2
-from sequential.kernels.call import bare_as
+from sequential.kernels.arrays import f0, f1, f2, i0, w1, w2
+from sequential.kernels.call import bare_as, inlined
 from sequential.kernels.matrices import (
     add_product_nt,
     cholesky,
@@ -18,7 +18,7 @@ from sequential.kernels.matrices import (
     symmetrise,
 )
 
-__all__ = ["LOG_TWO_PI", "gain_and_innovation", "joseph"]
+__all__ = ["LOG_TWO_PI", "add_correction", "admit", "gain_and_innovation", "joseph"]
 
 PAIR = types.Tuple([f0, f0])
 LOG_TWO_PI = math.log(2.0 * math.pi)
@@ -75,3 +75,24 @@ def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):
             left[i, j] = gain[j, i]
     add_product_nt(scaled, left, p, d, m, d)
     symmetrise(p, d)
+
+
+@bare_as(types.void(f2, f1, i0, i0, w1))
+def add_correction(gain, residual, m, d, out):
+    """out (d,) += K residual, with Kᵀ (m, d) in `gain`."""
+    for i in range(d):
+        for k in range(m):
+            out[i] += gain[k, i] * residual[k]
+
+
+@inlined
+def admit(model, reading, s, m, nis, residual, innovation_cov, out):
+    """Write the innovation down and judge it: 1 take it, 0 the gate is shut, -1 S was indefinite."""
+    for i in range(m):
+        out.residual[reading, i] = residual[i]
+        for j in range(m):
+            out.residual_cov[reading, i, j] = innovation_cov[i, j]
+    if nis < 0.0:
+        return -1
+    out.accepted[reading] = 0 if nis > model.gate[s] else 1
+    return out.accepted[reading]

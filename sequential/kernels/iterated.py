@@ -13,18 +13,10 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.arrays import f0, f1, f2, i0, w2
-from sequential.kernels.belief import gain_and_innovation, joseph
+from sequential.kernels.belief import add_correction, gain_and_innovation, joseph
 from sequential.kernels.call import bare, bare_as, inlined
-from sequential.kernels.charts import transport
-from sequential.kernels.extended import predict
-from sequential.kernels.matrices import (
-    copy_matrix,
-    copy_vector,
-    fill_diagonal,
-    multiply,
-    multiply_nt,
-    push_covariance,
-)
+from sequential.kernels.matrices import copy_matrix, copy_vector, multiply, multiply_nt
+from sequential.kernels.moving import linearise_move, linearise_prior
 from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, scratch_size, sensor_jacobian
 
@@ -65,9 +57,7 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     nis, _ = gain_and_innovation(cov, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain)
     if nis < 0.0:
         return -1
-    for i in range(d):
-        for k in range(m):
-            mean[i] += gain[k, i] * residual[k]
+    add_correction(gain, residual, m, d, mean)
     joseph(cov, h, gain, noise, weight, m, d, work[0], work[1], scaled)
     return 0
 
@@ -94,25 +84,15 @@ def whitened_square(noise, residual, m, lower, white):
 @bare
 def filter_chain(model, plan, prior, trajectory, states, belief, x, q, frames, vectors, work, update, out):
     """The loop of `filter_steps`, with every array at hand."""
-    n, d, blocks = model.n, model.d, len(model.table)
+    n, d = model.n, model.d
     phi, turn, inverse, cov = frames
     mean, e, step, expected, residual = vectors
     for node in range(len(plan.reading_ptr) - 1):
         if node == 0:
-            copy_vector(prior[0], x)
-            copy_matrix(prior[1], cov)
-            transport(model.table, blocks, d, x, 0, states, 0, e, turn, inverse)
-            push_covariance(inverse, cov, work[0], work[1], d)
+            linearise_prior(model, prior, states, x, cov, e, turn, inverse, work)
             copy_matrix(turn, phi)
         else:
-            copy_vector(trajectory[node - 1], x)
-            fill_diagonal(q, 0.0)
-            fill_diagonal(phi, 1.0)
-            predict(model, plan, node, belief, x, q, phi, 1, work)
-            transport(model.table, blocks, d, x, 0, states, node * n, e, turn, inverse)
-            push_covariance(inverse, q, work[0], work[1], d)
-            multiply(turn, phi, work[0], d, d, d)
-            copy_matrix(work[0], phi)
+            linearise_move(model, plan, node, trajectory, states, belief, x, q, phi, e, turn, inverse, work)
             multiply(phi, cov, work[0], d, d, d)
             multiply_nt(work[0], phi, cov, d, d, d)
             for i in range(d):

@@ -14,17 +14,8 @@ from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2, i1
 from sequential.kernels.call import bare, inlined
-from sequential.kernels.charts import transport
-from sequential.kernels.extended import predict
-from sequential.kernels.matrices import (
-    cholesky,
-    copy_matrix,
-    copy_vector,
-    fill_diagonal,
-    multiply,
-    push_covariance,
-    solve_lower,
-)
+from sequential.kernels.matrices import cholesky, solve_lower
+from sequential.kernels.moving import linearise_move, linearise_prior
 from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, scratch_size, sensor_jacobian
 
@@ -164,27 +155,18 @@ def linearise_nodes(
     rows,
 ):
     """The loop of `linearise_chain`, with every array at hand."""
-    n, d, blocks = model.n, model.d, len(model.table)
+    n, d = model.n, model.d
     phi, turn, inverse, lower, block = frames
     cost = 0.0
     for node in range(len(plan.reading_ptr) - 1):
         row = rows.first[node]
         if node == 0:
-            copy_vector(prior[0], x)
-            copy_matrix(prior[1], q)
-            transport(model.table, blocks, d, x, 0, states, 0, e, turn, inverse)
-            push_covariance(inverse, q, work[0], work[1], d)
+            linearise_prior(model, prior, states, x, q, e, turn, inverse, work)
             cost += write_prior(q, e, inverse, moving, static, lower, block, rows)
             row += d
         else:
-            copy_vector(trajectory[node - 1], x)
-            fill_diagonal(q, 0.0)
-            fill_diagonal(phi, 1.0)
-            predict(model, plan, node, belief, x, q, phi, 1, work)
-            transport(model.table, blocks, d, x, 0, states, node * n, e, turn, inverse)
-            push_covariance(inverse, q, work[0], work[1], d)
-            multiply(turn, phi, work[0], d, d, d)
-            moved = write_motion(work[0], q, e, inverse, row, moving, static, lower, block, work[1], rows)
+            linearise_move(model, plan, node, trajectory, states, belief, x, q, phi, e, turn, inverse, work)
+            moved = write_motion(phi, q, e, inverse, row, moving, static, lower, block, work[1], rows)
             if moved < 0.0:
                 return cost, node
             cost += moved

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from sequential.kernels.arrays import f1, f2, f3, i1, i2
+from sequential.kernels.arrays import f1, f2, f3, i1, i2, w2, w3
 from sequential.timeline import Schedule
 
-__all__ = ["MODEL", "SCHEDULE", "ModelTables"]
+__all__ = ["FILTERED", "FINISHED", "MODEL", "SCHEDULE", "Filtered", "ModelTables"]
 
 
 class ModelTables(NamedTuple):
@@ -44,3 +44,20 @@ MODEL = types.NamedTuple(
     ModelTables,
 )
 SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2, f1], Schedule)
+
+
+class Filtered(NamedTuple):
+    """What a filter writes; with `keep` = 0 the three arrays of predictions have length one."""
+
+    mean: Any  # (K, n)
+    cov: Any  # (K, d, d)
+    predicted_mean: Any  # (K, n)
+    predicted_cov: Any  # (K, d, d)
+    transition: Any  # (K, d, d)
+    residual: Any  # (M, m)
+    residual_cov: Any  # (M, m, m)
+    accepted: Any  # (M,) 1 used, 0 rejected by its gate
+
+
+FILTERED = types.NamedTuple([w2, w3, w2, w3, w3, w2, w3, types.int64[::1]], Filtered)
+FINISHED = types.Tuple([types.float64, types.int64])

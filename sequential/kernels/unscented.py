@@ -16,12 +16,11 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2
-from sequential.kernels.belief import LOG_TWO_PI, gain_and_innovation, joseph
+from sequential.kernels.belief import LOG_TWO_PI, add_correction, admit, gain_and_innovation, joseph
 from sequential.kernels.call import bare, call
 from sequential.kernels.charts import local, retract
-from sequential.kernels.extended import FILTERED, FINISHED
 from sequential.kernels.matrices import copy_matrix, copy_vector, multiply
-from sequential.kernels.records import MODEL, SCHEDULE
+from sequential.kernels.records import FILTERED, FINISHED, MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight
 
 __all__ = ["filter_sigma_points"]
@@ -186,16 +185,9 @@ def absorb(model, plan, reading, x, p, weights, sigma, seen, update, work, out):
     if not look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
         return math.nan
     nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, factor, cross, gain)
-    for i in range(m):
-        out.residual[reading, i] = residual[i]
-        for j in range(m):
-            out.residual_cov[reading, i, j] = innovation_cov[i, j]
-    if nis < 0.0:
-        return math.nan
-    if nis > model.gate[s]:
-        out.accepted[reading] = 0
-        return 0.0
-    out.accepted[reading] = 1
+    verdict = admit(model, reading, s, m, nis, residual, innovation_cov, out)
+    if verdict < 1:
+        return math.nan if verdict < 0 else 0.0
     log_likelihood = -0.5 * (nis + log_det + m * LOG_TWO_PI)
     weight = loss_weight(model.loss[s], model.loss_k[s], nis / m)
     if weight < 1.0:
@@ -205,8 +197,7 @@ def absorb(model, plan, reading, x, p, weights, sigma, seen, update, work, out):
         gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, factor, cross, gain)
     for i in range(d):
         delta[i] = 0.0
-        for k in range(m):
-            delta[i] += gain[k, i] * residual[k]
+    add_correction(gain, residual, m, d, delta)
     joseph(p, h, gain, noise, 1.0, m, d, work[0], work[1], scaled)
     retract(model.table, 0, len(model.table), x, 0, delta, 0, x, 0)
     return log_likelihood

@@ -7,8 +7,8 @@ from numba import njit, types
 
 from sequential.kernels.arrays import f2, w2, w3
 from sequential.kernels.call import bare
-from sequential.kernels.extended import predict
 from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal
+from sequential.kernels.moving import predict
 from sequential.kernels.records import MODEL, SCHEDULE
 
 __all__ = ["walk"]

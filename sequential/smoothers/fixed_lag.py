@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sequential.compile import compiled
-from sequential.filters.solution import require_finite, require_solved
+from sequential.filters.solution import require_finite
 from sequential.history import Report, Run
-from sequential.manifold import Vector
+from sequential.smoothers.chain import ChainPass
 from sequential.smoothers.online import predicted_innovations
-from sequential.timeline import Problem
+from sequential.timeline import Problem, Schedule
 
 __all__ = ["FixedLagSmoother"]
 
@@ -50,7 +49,7 @@ class FixedLagSmoother:
         for k in range(nodes):
             window.grow(k, int(oldest[k]))
             window.settle(self.max_iterations, self.tolerance)
-            mean[k], cov[k] = window.states[k], window.cov[-1]
+            mean[k], cov[k] = window.states[k], window.chain.cov[-1]
         require_finite(problem, mean)
         seconds = time.perf_counter() - began
         report = Report(self.name, iterations=window.solves, seconds=seconds, message=window.whole.message())
@@ -70,12 +69,10 @@ class _Window:
         self.first = self.last = self.solves = 0
         self.prior_mean, self.prior_cov = problem.model.prior.mean, problem.model.prior.cov
         self.states = np.tile(self.prior_mean, (len(problem.t), 1))
-        self.flat = Vector(self.whole.tables.d).table()
-        self.linearised: Any = None
+        self.chain = ChainPass(problem, self.plan(0, 0))
         self.about = self.states[:1]
-        self.cov = np.empty((0, 0, 0))
 
-    def plan(self, first: int, last: int) -> Any:
+    def plan(self, first: int, last: int) -> Schedule:
         """The schedule of some nodes: pointers are cut, what they point at stays."""
         plan, span = self.problem.schedule, slice(first, last + 2)
         return plan._replace(step_ptr=plan.step_ptr[span], reading_ptr=plan.reading_ptr[span])
@@ -98,32 +95,20 @@ class _Window:
 
     def _hand_over(self, leaving: int) -> None:
         """Make the belief that some nodes leave behind the prior of the next one, in its own tangent."""
-        manifold, step = self.problem.model.manifold, self.linearised.predicted_mean[leaving]
-        self.prior_mean = manifold.retract(self.about[leaving], step)
+        manifold, forward = self.problem.model.manifold, self.chain.forward
+        self.prior_mean = manifold.retract(self.about[leaving], forward.predicted_mean[leaving])
         _, inverse = manifold.transport(self.about[leaving], self.prior_mean)
-        self.prior_cov = inverse @ self.linearised.predicted_cov[leaving] @ inverse.T
+        self.prior_cov = inverse @ forward.predicted_cov[leaving] @ inverse.T
         self.first += leaving
 
     def settle(self, max_iterations: int, tolerance: float) -> None:
         """Gauss-Newton over the window."""
-        from sequential.kernels.iterated import Linearised, filter_steps
-        from sequential.kernels.smoothing import smooth_history
-
-        count, d = self.last - self.first + 1, self.whole.tables.d
-        shapes = ((count, d), (count, d, d), (count, d), (count, d, d), (count, d, d))
-        out = Linearised(*map(np.empty, shapes))
-        delta, cov = np.empty((count, d)), np.empty((count, d, d))
-        inside = slice(self.first, self.last + 1)
-        plan = self.plan(self.first, self.last)
+        prior, inside = (self.prior_mean, self.prior_cov), slice(self.first, self.last + 1)
+        self.chain = ChainPass(self.problem, self.plan(self.first, self.last))
         for _ in range(max_iterations):
-            about = self.states[inside].copy()
-            failed = filter_steps(self.whole.tables, plan, self.prior_mean, self.prior_cov, about, out)
-            self.whole.raise_failures()
-            require_solved(self.problem, failed)
-            smooth_history(self.flat, *out, 1, delta, cov)
-            self.states[inside] = self.problem.model.manifold.retract(about, delta)
-            self.about, self.linearised, self.cov = about, out, cov
+            self.about = self.states[inside].copy()
+            self.chain.solve(*prior, self.about)
+            self.states[inside] = self.problem.model.manifold.retract(self.about, self.chain.step)
             self.solves += 1
-            sigmas = np.sqrt(np.diagonal(cov, axis1=1, axis2=2).clip(1e-300))
-            if np.max(np.abs(delta) / sigmas) <= tolerance:
+            if self.chain.largest() <= tolerance:
                 return

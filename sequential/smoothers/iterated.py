@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sequential.compile import compiled
 from sequential.errors import NotConvergedError
-from sequential.filters.solution import require_finite, require_solved
+from sequential.filters.solution import require_finite
 from sequential.history import Report, Run
-from sequential.manifold import Vector
+from sequential.smoothers.chain import ChainPass
 from sequential.smoothers.leave_one_out import leave_one_out
 from sequential.smoothers.rauch_tung_striebel import RauchTungStriebel
 from sequential.timeline import Problem
@@ -50,25 +49,14 @@ class IteratedSmoother:
 
     def refine(self, problem: Problem, trajectory: np.ndarray) -> Run:
         """Gauss-Newton from a given trajectory (K, n)."""
-        from sequential.kernels.iterated import Linearised, filter_steps
-        from sequential.kernels.smoothing import smooth_history
-
-        whole = compiled(problem.model)
-        nodes, d = len(problem.t), whole.tables.d
-        out = Linearised(*(np.empty((nodes, d) if flat else (nodes, d, d)) for flat in (1, 0, 1, 0, 0)))
-        flat = Vector(d).table()
+        chain = ChainPass(problem, problem.schedule)
         prior, manifold = problem.model.prior, problem.model.manifold
-        trajectory = np.array(trajectory)
-        delta, cov = np.empty((nodes, d)), np.empty((nodes, d, d))
         largest, iteration = np.inf, 0
         while iteration < self.max_iterations and largest > self.tolerance:
             iteration += 1
-            failed = filter_steps(whole.tables, problem.schedule, prior.mean, prior.cov, trajectory, out)
-            whole.raise_failures()
-            require_solved(problem, failed)
-            smooth_history(flat, *out, 1, delta, cov)
-            largest = float(np.max(np.abs(delta) / np.sqrt(np.diagonal(cov, axis1=1, axis2=2).clip(1e-300))))
-            trajectory = manifold.retract(trajectory, delta)
+            chain.solve(prior.mean, prior.cov, trajectory)
+            largest = chain.largest()
+            trajectory = manifold.retract(trajectory, chain.step)
             require_finite(problem, trajectory)
         converged = largest <= self.tolerance
         message = "" if converged else f"still moving by {largest:.2g} σ after {iteration} iterations"
@@ -76,5 +64,5 @@ class IteratedSmoother:
             raise NotConvergedError(
                 f"the iterated smoother is {message}; raise max_iterations or mend the start"
             )
-        report = Report(self.name, converged, iteration, message=message or whole.message())
-        return Run(problem.t, trajectory, cov, manifold, {}, float("nan"), report)
+        report = Report(self.name, converged, iteration, message=message or chain.whole.message())
+        return Run(problem.t, trajectory, chain.cov, manifold, {}, float("nan"), report)
