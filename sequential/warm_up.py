@@ -18,7 +18,7 @@ from sequential.errors import ModelError
 __all__ = ["warm_up"]
 
 # Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
-SMALL = ("matrices", "poses", "charts", "belief", "sensing")
+SMALL = ("matrices", "poses", "charts", "belief", "bierman", "sensing")
 KERNELS = ("extended", "unscented", "iterated", "linearize", "smoothing", "looking", "walking")
 MODELS = ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared")
 

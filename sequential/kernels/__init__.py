@@ -19,6 +19,7 @@ __all__ = ["cache_folder"]
 INLINED = (
     "kernels/arrays.py",
     "kernels/belief.py",
+    "kernels/bierman.py",
     "kernels/call.py",
     "kernels/moving.py",
     "kernels/records.py",
