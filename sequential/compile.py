@@ -82,17 +82,15 @@ def _lower(model: StateSpace) -> Compiled:
         observe.append(_address(whole, g, g.value, f"sensor {name!r}", (n, g.inputs, m.size)))
         look.append(_address(whole, g, g.jacobian, f"sensor {name!r} jacobian", (n, g.inputs, m.dim * d)))
     widest = max([s.manifold.dim for s in sensors] or [1])
-    noise_cov = np.zeros((len(sensors), widest, widest))
-    for k, sensor in enumerate(sensors):
-        noise_cov[k, : sensor.manifold.dim, : sensor.manifold.dim] = sensor.noise_cov
+    gate = np.array([[_threshold(s.gate, m) for m in range(widest + 1)] for s in sensors])
     z_tables = [s.manifold.table() for s in sensors] or [np.zeros((0, 5), dtype=np.int64)]
     params = [g.params for g in lowered] or [np.zeros(1)]
     entries: tuple[Any, ...] = (
         model.manifold.table(), n, d, *process, *fused, f.params,
         _ints(observe), _ints(look), np.concatenate(params), _starts(params),
         np.ascontiguousarray(np.concatenate(z_tables)), np.append(_starts(z_tables), sum(map(len, z_tables))),
-        _ints([s.manifold.size for s in sensors]), _ints([s.manifold.dim for s in sensors]), noise_cov,
-        np.array([_threshold(s.gate, s.manifold.dim) for s in sensors]),
+        _ints([s.manifold.size for s in sensors]), _ints([s.manifold.dim for s in sensors]),
+        gate.reshape(len(sensors), widest + 1),
         _ints([s.loss.code if s.loss else 0 for s in sensors]),
         np.array([s.loss.k if s.loss else 0.0 for s in sensors]),
     )  # fmt: skip
@@ -109,7 +107,7 @@ def _starts(pieces: list[Any]) -> NDArray[np.int64]:
 
 
 def _threshold(gate: float | None, dim: int) -> float:
-    if gate is None:
+    if gate is None or dim == 0:
         return float("inf")
     if not 0.0 < gate < 1.0:
         msg = f"a gate is a probability between 0 and 1, such as 0.999; got {gate}"

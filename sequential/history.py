@@ -28,21 +28,28 @@ class Innovations:
 
     t: Ints  # (M,) ns
     row: Ints  # (M,) row in the stream
-    residual: Array  # (M, m) measured minus expected, in the tangent of the measurement
-    cov: Array  # (M, m, m) covariance of the residual
+    residual: Array  # (M, m) measured minus expected, in the tangent of the measurement; NaN where missing
+    cov: Array  # (M, m, m) covariance of the residual; a missing component has a unit variance of its own
     accepted: NDArray[np.bool_]  # (M,) False where a gate rejected the reading
     kind: str = "filter"  # or "leave-one-out"
 
     def nis(self) -> Array:
-        """(M,) normalised innovation squared, rᵀ S⁻¹ r, of every reading, gated or not."""
-        solved = np.linalg.solve(self.cov, self.residual[..., None])[..., 0]
-        squared: Array = np.einsum("ni,ni->n", self.residual, solved)
+        """(M,) normalised innovation squared, rᵀ S⁻¹ r, of every reading, gated or not: χ² with `dof()`."""
+        present = np.nan_to_num(self.residual)
+        solved = np.linalg.solve(self.cov, present[..., None])[..., 0]
+        squared: Array = np.einsum("ni,ni->n", present, solved)
         return squared
 
+    def dof(self) -> Ints:
+        """(M,) components that each reading has; fewer than m where some are missing."""
+        count: Ints = np.isfinite(self.residual).sum(axis=1)
+        return count
+
     def whitened(self) -> Array:
-        """(M, m) residuals multiplied by the inverse Cholesky factor of their covariance."""
+        """(M, m) residuals times the inverse Cholesky factor of their covariance; NaN where missing."""
         lower = np.linalg.cholesky(self.cov)
-        return np.linalg.solve(lower, self.residual[..., None])[..., 0]
+        white = np.linalg.solve(lower, np.nan_to_num(self.residual)[..., None])[..., 0]
+        return np.where(np.isnan(self.residual), np.nan, white)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +71,8 @@ class Report:
     seconds: float = 0.0
     cost: float = float("nan")  # half the sum of squared whitened residuals, where the estimator has one
     message: str = ""
-    rejected: int = 0
+    rejected: int = 0  # by gates
+    missing: int = 0  # readings that were NaN throughout
     details: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -9,7 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sequential.errors import DataError, MissingStreamError, NotFiniteError, ShapeError, TimeOrderError
+from sequential.errors import (
+    DataError,
+    MissingStreamError,
+    NotFiniteError,
+    NotPositiveDefiniteError,
+    ShapeError,
+    TimeOrderError,
+)
 
 __all__ = ["SensorLog", "Stream", "nanoseconds", "seconds"]
 
@@ -66,6 +73,28 @@ def frozen(values: ArrayLike) -> Array:
     return own
 
 
+def covariances(values: ArrayLike, count: int) -> Array:
+    """(N, m, m) read-only covariances from as many, or from (N, m) variances.
+
+    Raises
+    ------
+    ShapeError, NotPositiveDefiniteError
+    """
+    given = numbers(values, "noise_cov")
+    if given.ndim == 2:
+        given = given[:, :, None] * np.eye(given.shape[1])
+    if given.ndim != 3 or given.shape[1] != given.shape[2] or len(given) != count:
+        msg = f"{count} readings need noise_cov of shape ({count}, m, m), got {np.shape(values)}"
+        raise ShapeError(msg)
+    sound = np.isfinite(given).all(axis=(1, 2)) & (np.diagonal(given, axis1=1, axis2=2) > 0).all(axis=1)
+    if sound.all():
+        sound = np.linalg.eigvalsh(given).min(axis=1) > 0
+    if not sound.all():
+        at = int(np.flatnonzero(~sound)[0])
+        raise NotPositiveDefiniteError(f"noise_cov of reading {at} is not a positive definite matrix")
+    return frozen(0.5 * (given + np.swapaxes(given, 1, 2)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
     """Readings of one sensor.
@@ -77,12 +106,18 @@ class Stream:
     context : (N, c), what is known about each reading, such as the index of the landmark that was seen
     covers : for a stream that drives a process: does a sample hold for the interval `"after"` its
         stamp (until the next one) or `"before"` it (since the previous one)?
+    noise_cov : (N, m, m) or (N, m) variances, where every reading brings its own; in place of the sensor's
+
+    Notes
+    -----
+    NaN in `values` says that a component of a reading is missing.
     """
 
     t: Stamps
     values: Array
     context: Array | None = None
     covers: Literal["after", "before"] = "after"
+    noise_cov: Array | None = None
 
     def __post_init__(self) -> None:
         t = np.atleast_1d(nanoseconds(self.t)).copy()
@@ -104,6 +139,8 @@ class Stream:
                 msg = f"{len(t)} stamps need a context of shape ({len(t)}, c), got {np.shape(self.context)}"
                 raise ShapeError(msg)
             object.__setattr__(self, "context", context)
+        if self.noise_cov is not None:
+            object.__setattr__(self, "noise_cov", covariances(self.noise_cov, len(t)))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -111,7 +148,8 @@ class Stream:
     def select(self, rows: NDArray[Any]) -> Stream:
         """The readings that a mask or an index array names."""
         context = None if self.context is None else self.context[rows]
-        return Stream(self.t[rows], self.values[rows], context, self.covers)
+        noise = None if self.noise_cov is None else self.noise_cov[rows]
+        return Stream(self.t[rows], self.values[rows], context, self.covers, noise)
 
     def keys(self) -> NDArray[np.float64]:
         """(N, c) what tells readings of equal stamp apart: the context, or nothing."""
@@ -233,13 +271,13 @@ class SensorLog(Mapping[str, Stream]):
 
 
 def check_stream(name: str, stream: Stream) -> None:
-    """Raise if a stream is not finite, runs backwards or says a thing twice."""
-    bad = ~stream.finite()
+    """Raise if a stream holds infinities, runs backwards or says a thing twice; NaN is a missing value."""
+    bad = np.isinf(stream.values).any(axis=1) | ~np.isfinite(stream.keys()).all(axis=1)
     if bad.any():
         at = int(np.flatnonzero(bad)[0])
         msg = (
-            f"log[{name!r}] holds NaN or infinity at sample {at} (and {int(bad.sum()) - 1} more); "
-            "drop such samples with log.finite()"
+            f"log[{name!r}] holds infinity, or NaN in its context, at sample {at} "
+            f"(and {int(bad.sum()) - 1} more); drop such samples with log.finite()"
         )
         raise NotFiniteError(msg)
     back = np.flatnonzero(np.diff(stream.t) < 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -49,4 +50,8 @@ def run(
     DataError, ModelError, SolverError
         see `sequential.errors`; each says what to do.
     """
-    return estimator.solve(prepare(model, log, at, max_gap))
+    problem = prepare(model, log, at, max_gap)
+    solved = estimator.solve(problem)
+    if not problem.missing:
+        return solved
+    return replace(solved, report=replace(solved.report, missing=problem.missing))

@@ -5,15 +5,16 @@ Every estimator, recursive or graph, walks the same schedule, so that results ca
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import DataError, GapError, MissingStreamError, ShapeError
+from sequential.errors import GapError, MissingStreamError, NotFiniteError
 from sequential.log import SensorLog, Stream, nanoseconds, seconds
 from sequential.model import StateSpace
+from sequential.readings import ReadingNoise, gather, noise_of, require_columns
 
 __all__ = ["Problem", "Schedule", "prepare"]
 
@@ -40,6 +41,9 @@ class Schedule(NamedTuple):
     z: Array  # (M, largest measurement)
     context: Array  # (M, largest context)
     z_flat: Array  # z once more, row after row
+    noise_cov: Array  # (T, m, m) distinct noises; a missing component has a unit variance of its own
+    noise_row: Ints  # (M,) row of `noise_cov` that holds for a reading
+    rows: Ints  # (M,) components of a reading that are not missing; z is NaN at the others
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +55,41 @@ class Problem:
     t: Ints  # (K,) ns, time of each node
     reading_t: Ints  # (M,) ns
     reading_row: Ints  # (M,) row in the reading's stream
+    noise: ReadingNoise
     log_name: str = "log"
+    missing: int = 0  # readings that were dropped because all their components were NaN
+
+    def __post_init__(self) -> None:
+        # the noises are the model's: a problem that is given another model of its family gets that one's
+        noises = sealed(self.noise.table(self.model))
+        object.__setattr__(self, "schedule", self.schedule._replace(noise_cov=noises))
+
+    @property
+    def plain(self) -> bool:
+        """Whether every reading is whole and has the noise of its sensor."""
+        return self.noise.given is None and len(self.noise.sensor) == len(self.model.sensors)
+
+    def only(self, kept: NDArray[np.bool_]) -> Problem:
+        """The problem with some of its readings, at the same nodes."""
+        plan, z = self.schedule, self.schedule.z[kept]
+        pointer = np.append(0, np.cumsum(kept))[plan.reading_ptr]
+        noise = replace(self.noise, row=self.noise.row[kept], rows=self.noise.rows[kept])
+        fewer = plan._replace(
+            reading_ptr=sealed(pointer.astype(np.int64)),
+            sensor=sealed(plan.sensor[kept]),
+            z=sealed(z),
+            context=sealed(plan.context[kept]),
+            z_flat=sealed(z.ravel()),
+            noise_row=sealed(noise.row),
+            rows=sealed(noise.rows),
+        )
+        t, row = self.reading_t[kept], self.reading_row[kept]
+        return replace(self, schedule=fewer, reading_t=t, reading_row=row, noise=noise)
+
+    def noises(self, readings: NDArray[Any], dim: int) -> Array:
+        """(R, dim, dim) noise covariances of some readings of one sensor."""
+        cov: Array = self.schedule.noise_cov[self.schedule.noise_row[readings], :dim, :dim]
+        return cov
 
 
 def prepare(
@@ -70,17 +108,20 @@ def prepare(
     """
     log = log.check()
     start = log.span()[0] if model.start_ns is None else model.start_ns
-    sensor, z, context, t, row = _readings(model, log, start)
-    wanted = [t, np.array([start])] + ([] if at is None else [nanoseconds(at)])
+    found = gather(model, log, start)
+    noise, t = noise_of(model, found), found.t
+    wanted = [found.stamps, np.array([start])] + ([] if at is None else [nanoseconds(at)])
     nodes = merged(*wanted)
     nodes = nodes[nodes >= start]
     order = np.argsort(t, kind="stable")
     reading_ptr = np.searchsorted(t[order], nodes, side="left")
     reading_ptr = np.append(reading_ptr, len(t)).astype(np.int64)
     steps = _steps(model, log, nodes, max_gap)
-    ordered = (z[order], context[order], z[order].ravel())
-    schedule = Schedule(*map(sealed, (*steps, reading_ptr, sensor[order], *ordered)))
-    return Problem(model, schedule, nodes, t[order], row[order], log.name)
+    z = found.z[order]
+    readings = (found.sensor[order], z, found.context[order], z.ravel(), np.zeros((1, 1, 1)))
+    noise = replace(noise, row=noise.row[order], rows=noise.rows[order])
+    schedule = Schedule(*map(sealed, (*steps, reading_ptr, *readings, noise.row, noise.rows)))
+    return Problem(model, schedule, nodes, t[order], found.row[order], noise, log.name, found.dropped)
 
 
 def merged(*stamps: Ints) -> Ints:
@@ -96,66 +137,6 @@ def sealed(values: NDArray[Any]) -> NDArray[Any]:
     return own
 
 
-def _readings(model: StateSpace, log: SensorLog, start: int) -> tuple[Ints, Array, Array, Ints, Ints]:
-    """All readings at or after `start`, sensor after sensor."""
-    sizes = [s.manifold.size for s in model.sensors.values()] or [1]
-    contexts = [max(1, f.inputs) for f in model.sensor_functions.values()] or [1]
-    sensor, z, context, t, row = [], [], [], [], []
-    for index, (name, model_of) in enumerate(model.sensors.items()):
-        stream = log[name]
-        _require_columns(name, stream, model_of.manifold.size, model.sensor_functions[name].inputs)
-        kept = np.flatnonzero(stream.t >= start)
-        if not len(kept):
-            msg = f"log[{name!r}] has no reading at or after the start; drop the sensor or mend the log"
-            raise MissingStreamError(msg)
-        padded = np.zeros((len(kept), max(sizes)))
-        padded[:, : stream.values.shape[1]] = stream.values[kept]
-        known = np.zeros((len(kept), max(contexts)))
-        if stream.context is not None:
-            _require_landmarks(name, stream.context[:, 0], kept, getattr(model_of, "landmarks", None))
-            width = min(stream.context.shape[1], known.shape[1])
-            known[:, :width] = stream.context[kept, :width]
-        sensor.append(np.full(len(kept), index))
-        z.append(padded)
-        context.append(known)
-        t.append(stream.t[kept])
-        row.append(kept)
-    if not sensor:
-        none = np.zeros(0, dtype=np.int64)
-        return none, np.zeros((0, 1)), np.zeros((0, 1)), none, none
-    return (
-        np.concatenate(sensor).astype(np.int64),
-        np.concatenate(z),
-        np.concatenate(context),
-        np.concatenate(t),
-        np.concatenate(row).astype(np.int64),
-    )
-
-
-def _require_columns(name: str, stream: Stream, size: int, context: int) -> None:
-    if stream.values.shape[1] != size:
-        msg = f"log[{name!r}] has {stream.values.shape[1]} columns, the model takes {size}"
-        raise ShapeError(msg)
-    given = 0 if stream.context is None else stream.context.shape[1]
-    if given < context:
-        msg = f"log[{name!r}] needs {context} context columns (such as the landmark seen), it has {given}"
-        raise ShapeError(msg)
-
-
-def _require_landmarks(name: str, index: Array, kept: NDArray[Any], landmarks: Any) -> None:
-    """A compiled sensor reads its table at the index in the context, so the index must be a row of it."""
-    if landmarks is None:
-        return
-    seen, count = index[kept], len(landmarks)
-    wrong = np.flatnonzero((seen != np.floor(seen)) | (seen < 0) | (seen >= count))
-    if len(wrong):
-        msg = (
-            f"log[{name!r}] sees landmark {seen[wrong[0]]:g} at sample {kept[wrong[0]]}, but its sensor has "
-            f"{count} landmarks, 0 to {count - 1}; mend the context or the sensor's table"
-        )
-        raise DataError(msg)
-
-
 def _steps(
     model: StateSpace, log: SensorLog, nodes: Ints, max_gap: float | None
 ) -> tuple[Ints, Array, Ints, Array]:
@@ -165,7 +146,8 @@ def _steps(
         dt = np.diff(nodes) * 1e-9
         return pointer, dt, np.zeros(len(dt), dtype=np.int64), np.zeros((1, 1))
     stream = log[model.input]
-    _require_columns(model.input, stream, model.process_functions.inputs, 0)
+    require_columns(model.input, stream, model.process_functions.inputs, 0)
+    _require_driven(model.input, stream)
     if not len(stream):
         msg = f"log[{model.input!r}] drives the process and is empty"
         raise MissingStreamError(msg)
@@ -180,6 +162,16 @@ def _steps(
     pointer = np.searchsorted(edges, nodes).astype(np.int64)
     pointer = np.concatenate([[0], pointer])
     return pointer, np.diff(edges) * 1e-9, rows, np.ascontiguousarray(stream.values)
+
+
+def _require_driven(name: str, stream: Stream) -> None:
+    bad = np.flatnonzero(~np.isfinite(stream.values).all(axis=1))
+    if len(bad):
+        msg = (
+            f"log[{name!r}] drives the process and holds NaN at sample {bad[0]} (and {len(bad) - 1} more); "
+            "a sensor may miss a reading, an input may not: drop such samples with log.finite()"
+        )
+        raise NotFiniteError(msg)
 
 
 def _require_no_gap(name: str, stream: Stream, nodes: Ints, max_gap: float | None) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from factorlab.compare.accuracy import Errors
 from sequential.errors import NotPositiveDefiniteError
 from sequential.evaluate import Consistency, block_bootstrap, chi2_band, nis_summary, summarise
-from sequential.evaluate.consistency import chi2_quantile
+from sequential.evaluate.consistency import chi2_quantile, whole_nis
 from sequential.history import Innovations
 
 __all__ = ["Nis", "NormalisedError", "nis_of", "normalised_error_of"]
@@ -129,7 +129,7 @@ def _one(found: Consistency, taken: Innovations) -> Nis:
 
 def _together(each: Mapping[str, Innovations], sensors: Mapping[str, Nis]) -> Nis:
     """Sums of independent χ² values are χ² with the sum of their freedoms."""
-    values = np.concatenate([taken.nis()[taken.accepted] for taken in each.values()])
+    values = np.concatenate([whole_nis(taken)[taken.accepted] for taken in each.values()])
     freedom = round(sum(nis.expected * nis.count for nis in sensors.values()))
     low, high = (edge / len(values) for edge in chi2_band(freedom, 1))
     mean = float(values.mean())
@@ -148,5 +148,5 @@ def _together(each: Mapping[str, Innovations], sensors: Mapping[str, Nis]) -> Ni
 
 
 def _share_inside(taken: Innovations) -> float:
-    values, m = taken.nis()[taken.accepted], taken.residual.shape[1]
+    values, m = whole_nis(taken)[taken.accepted], taken.residual.shape[1]
     return float(np.mean((values >= chi2_quantile(0.025, m)) & (values <= chi2_quantile(0.975, m))))

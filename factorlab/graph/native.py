@@ -83,7 +83,8 @@ def native_graph(problem: Problem) -> NativeGraph | None:
     import factorlab.graph.factors.inertial
     import factorlab.graph.factors.planar  # noqa: F401
 
-    return native_process(problem.model.process, problem)
+    # missing components and noises of single readings have no place in a native factor
+    return native_process(problem.model.process, problem) if problem.plain else None
 
 
 def noise_model(cov: ArrayLike, loss: Loss | None = None) -> Any:

@@ -12,7 +12,7 @@ from factorlab.report.pair import filter_of, smoother_of
 from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, widths
 from sequential.errors import ShapeError
 from sequential.evaluate import whiteness
-from sequential.evaluate.consistency import chi2_quantile
+from sequential.evaluate.consistency import chi2_quantile, whole_nis
 from sequential.history import Innovations
 from sequential.log import seconds
 
@@ -45,7 +45,7 @@ def _dots(axes: Axes, row: Row, sensor: str) -> None:
     taken = row.run.innovations[sensor]
     t, nis, m = (
         seconds(taken.t, int(row.run.t[0])),
-        np.maximum(taken.nis(), SMALLEST),
+        np.maximum(whole_nis(taken), SMALLEST),
         taken.residual.shape[1],
     )
     low, high = chi2_quantile(0.025, m), chi2_quantile(0.975, m)

@@ -152,7 +152,7 @@ class _Search:
     def together(self) -> Candidate:
         """Every covariance by one factor: the estimates stay, and the factor has a closed form."""
         seen = self.base.innovations.values()
-        count = sum(i.residual.size for i in seen)
+        count = sum(int(i.dof().sum()) for i in seen)
         total = sum(float(i.nis().sum()) for i in seen)
         factor = (total / count) ** 0.5 if count and total > 0.0 else 1.0
         gain = _likelihood(self.base, factor) - self.level

@@ -22,6 +22,7 @@ __all__ = [
     "nis_summary",
     "normalised_error",
     "summarise",
+    "whole_nis",
 ]
 
 Array = NDArray[np.float64]
@@ -124,9 +125,28 @@ def summarise(values: ArrayLike, dof: int, kind: str, gated: int = 0, level: flo
     )
 
 
+def whole_nis(innovations: Innovations) -> Array:
+    """(M,) NIS of all readings, χ² with m degrees of freedom also where components are missing.
+
+    The value of a partial reading is exchanged for the one that is as improbable with m degrees of freedom.
+    """
+    if not len(innovations.t):
+        return np.zeros(0)
+    from scipy.special import chdtrc, chdtri
+
+    nis, dof, m = innovations.nis(), innovations.dof(), innovations.residual.shape[1]
+    partial = np.flatnonzero(dof < m)
+    beyond = chdtrc(dof[partial], nis[partial])
+    # so improbable that its probability underflows: scaled, which is as far outside
+    nis[partial] = np.where(
+        beyond > 0.0, chdtri(m, np.maximum(beyond, 1e-300)), nis[partial] * m / np.maximum(dof[partial], 1)
+    )
+    return nis
+
+
 def nis_summary(innovations: Innovations) -> Consistency:
     """Summarise the normalised innovations squared of one sensor: accepted readings, gated ones counted."""
-    nis = innovations.nis()[innovations.accepted] if len(innovations.t) else np.zeros(0)
+    nis = whole_nis(innovations)[innovations.accepted]
     gated = int(np.count_nonzero(~innovations.accepted))
     return summarise(nis, innovations.residual.shape[1], innovations.kind, gated)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.evaluate.blame import Blame
-from sequential.evaluate.consistency import Consistency, nis_summary
+from sequential.evaluate.consistency import Consistency, nis_summary, whole_nis
 from sequential.evaluate.moments import Tail, pauses, tail, worst_span
 from sequential.evaluate.whiteness import whiteness
 from sequential.history import Innovations, Run
@@ -88,7 +88,7 @@ class _Seen:
     def of(cls, name: str, sensor: SensorModel, innovations: Innovations, run: Run) -> _Seen:
         t = (innovations.t - run.t[0]) * 1e-9
         accepted = innovations.accepted
-        nis = innovations.nis()[accepted] if len(t) else np.zeros(0)
+        nis = whole_nis(innovations)[accepted]
         whole = float(run.t[-1] - run.t[0]) * 1e-9
         summary = nis_summary(innovations)
         few = tail(t[accepted], nis, whole) if summary.median < summary.expected_median else None

@@ -119,24 +119,14 @@ def accepted_only(problem: Problem, run: Run) -> Problem:
         kept[plan.sensor == index] = run.innovations[name].accepted
     sensors = {name: _scaled(sensor, 1.0) for name, sensor in problem.model.sensors.items()}
     model = replace(problem.model, sensors=sensors, check=False)
-    pointer = np.append(0, np.cumsum(kept))[plan.reading_ptr]
-    z = plan.z[kept]
-    fewer = plan._replace(
-        reading_ptr=sealed(pointer.astype(np.int64)),
-        sensor=sealed(plan.sensor[kept]),
-        z=sealed(z),
-        context=sealed(plan.context[kept]),
-        z_flat=sealed(z.ravel()),
-    )
-    t, row = problem.reading_t[kept], problem.reading_row[kept]
-    return replace(problem, model=model, schedule=fewer, reading_t=t, reading_row=row)
+    return replace(problem.only(kept), model=model)
 
 
 def log_likelihood(innovations: Innovations, unit: float = 1.0) -> float:
     """Gaussian log density of the residuals when their covariances are multiplied by unit²."""
-    count, m = innovations.residual.shape
+    count = int(innovations.dof().sum())
     if not count:
         return 0.0
     spread: NDArray[np.float64] = np.linalg.slogdet(innovations.cov)[1]
-    constant = m * np.log(2.0 * np.pi * unit**2)
-    return float(-0.5 * np.sum(innovations.nis() / unit**2 + spread + constant))
+    constant = count * np.log(2.0 * np.pi * unit**2)
+    return float(-0.5 * (np.sum(innovations.nis() / unit**2 + spread) + constant))

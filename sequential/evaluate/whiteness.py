@@ -44,8 +44,8 @@ class Whiteness:
 
 
 def autocorrelation(values: Array, lags: int) -> Array:
-    """(lags, m) sample autocorrelation of each column of (N, m) at lags 1 … `lags`, mean removed."""
-    centred = values - values.mean(axis=0)
+    """(lags, m) autocorrelation of each column of (N, m) at lags 1 … `lags`, mean removed, NaN left out."""
+    centred = np.nan_to_num(values - np.nanmean(values, axis=0))
     energy = np.sum(centred**2, axis=0)
     energy = np.where(energy > 0.0, energy, 1.0)
     return np.stack([np.sum(centred[k:] * centred[:-k], axis=0) / energy for k in range(1, lags + 1)])
@@ -79,8 +79,8 @@ def whiteness(innovations: Innovations, lags: int | None = None, level: float = 
     r = autocorrelation(white, lags)
     statistic = float(n * (n + 2.0) * np.sum(r**2 / (n - np.arange(1, lags + 1.0))[:, None]))
     p_value = float(chdtrc(lags * m, statistic))
-    mean = white.mean(axis=0)
-    mean_p_value = float(chdtrc(m, n * float(mean @ mean)))
+    mean = np.nanmean(white, axis=0)
+    mean_p_value = float(chdtrc(m, float(np.isfinite(white).sum(axis=0) @ mean**2)))
     bound = Z / n**0.5
     return Whiteness(
         correlation=r,

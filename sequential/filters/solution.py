@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sequential.errors import NotFiniteError, NotPositiveDefiniteError
 from sequential.history import Innovations, Prediction, Report, Run
 from sequential.timeline import Problem
 
-__all__ = ["allocate", "as_run", "collect_innovations", "require_finite", "require_solved"]
+__all__ = ["allocate", "as_run", "collect_innovations", "masked", "require_finite", "require_solved"]
 
 
 def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:
@@ -86,11 +87,21 @@ def collect_innovations(problem: Problem, filtered: Any) -> Mapping[str, Innovat
         found[name] = Innovations(
             problem.reading_t[rows],
             problem.reading_row[rows],
-            filtered.residual[rows, :m],
+            masked(problem, rows, filtered.residual[rows, :m]),
             filtered.residual_cov[rows, :m, :m],
             filtered.accepted[rows].astype(bool),
         )
     return found
+
+
+def masked(
+    problem: Problem, readings: NDArray[np.int64], residual: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Residuals (R, m) of some readings, NaN where a component is missing."""
+    m = residual.shape[1]
+    if (problem.schedule.rows[readings] == m).all():
+        return residual
+    return np.where(np.isnan(problem.schedule.z[readings, :m]), np.nan, residual)
 
 
 def as_run(problem: Problem, filtered: Any, log_likelihood: float, report: Report, *, keep: bool) -> Run:

@@ -86,13 +86,15 @@ def add_correction(gain, residual, m, d, out):
 
 
 @inlined
-def admit(model, reading, s, m, nis, residual, innovation_cov, out):
+def admit(model, plan, reading, nis, residual, innovation_cov, out):
     """Write the innovation down and judge it: 1 take it, 0 the gate is shut, -1 S was indefinite."""
+    s = plan.sensor[reading]
+    m = model.z_dim[s]
     for i in range(m):
         out.residual[reading, i] = residual[i]
         for j in range(m):
             out.residual_cov[reading, i, j] = innovation_cov[i, j]
     if nis < 0.0:
         return -1
-    out.accepted[reading] = 0 if nis > model.gate[s] else 1
+    out.accepted[reading] = 0 if nis > model.gate[s, plan.rows[reading]] else 1
     return out.accepted[reading]

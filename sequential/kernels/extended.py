@@ -31,7 +31,7 @@ def iterate(model, plan, reading, x, p, weight, iterations, update, work, expect
     s = plan.sensor[reading]
     m, d, blocks = model.z_dim[s], model.d, len(model.table)
     h, flat, cross, gain, innovation_cov, lower, scaled, delta, e = update
-    noise = model.noise_cov[s]
+    noise = plan.noise_cov[plan.noise_row[reading]]
     start, prior = x.copy(), p.copy()
     retract(model.table, 0, blocks, start, 0, delta, 0, x, 0)
     turn, inverse = np.empty((d, d)), np.empty((d, d))
@@ -66,15 +66,15 @@ def absorb(model, plan, reading, x, p, iterations, update, work, expected, resid
     s = plan.sensor[reading]
     m, d, blocks = model.z_dim[s], model.d, len(model.table)
     h, flat, cross, gain, innovation_cov, lower, scaled, delta, _ = update
-    noise = model.noise_cov[s]
+    noise = plan.noise_cov[plan.noise_row[reading]]
     measure(model, plan, reading, x, 0, expected, residual)
     sensor_jacobian(model, plan, reading, x, 0, expected, flat, h)
     nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
-    verdict = admit(model, reading, s, m, nis, residual, innovation_cov, out)
+    verdict = admit(model, plan, reading, nis, residual, innovation_cov, out)
     if verdict < 1:
         return math.nan if verdict < 0 else 0.0
-    log_likelihood = -0.5 * (nis + log_det + m * LOG_TWO_PI)
-    weight = loss_weight(model.loss[s], model.loss_k[s], nis / m)
+    log_likelihood = -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
+    weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
     if weight < 1.0:
         gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain)
     for i in range(d):

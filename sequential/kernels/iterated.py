@@ -43,7 +43,7 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     s = plan.sensor[reading]
     m, d = model.z_dim[s], model.d
     h, flat, cross, gain, innovation_cov, lower, scaled = update
-    noise = model.noise_cov[s]
+    noise = plan.noise_cov[plan.noise_row[reading]]
     measure(model, plan, reading, trajectory, at, expected, residual)
     sensor_jacobian(model, plan, reading, trajectory, at, expected, flat, h)
     weight = 1.0

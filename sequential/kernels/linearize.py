@@ -58,7 +58,7 @@ def write_reading(model, plan, reading, states, at, row, moving, static, update,
     h, flat, lower, expected, residual, white = update
     measure(model, plan, reading, states, at, expected, residual)
     sensor_jacobian(model, plan, reading, states, at, expected, flat, h)
-    cholesky(model.noise_cov[s], lower, m, False)
+    cholesky(plan.noise_cov[plan.noise_row[reading]], lower, m, False)
     solve_lower(lower, h, m, model.d)
     for i in range(m):
         white[i, 0] = residual[i]

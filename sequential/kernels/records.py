@@ -32,18 +32,17 @@ class ModelTables(NamedTuple):
     z_first: Any  # (S+1,) rows of z_table
     z_size: Any  # (S,) storage of a measurement
     z_dim: Any  # (S,) tangent of a measurement
-    noise_cov: Any  # (S, m, m)
-    gate: Any  # (S,) largest NIS that is accepted; infinity without a gate
+    gate: Any  # (S, m+1) largest NIS that is accepted of so many components; infinity without a gate
     loss: Any  # (S,) 0 none, 1 Huber, 2 Cauchy
     loss_k: Any  # (S,)
 
 
 _int = types.int64
 MODEL = types.NamedTuple(
-    [i2, _int, _int, _int, _int, _int, _int, _int, f1, i1, i1, f1, i1, i2, i1, i1, i1, f3, f1, i1, f1],
+    [i2, _int, _int, _int, _int, _int, _int, _int, f1, i1, i1, f1, i1, i2, i1, i1, i1, f2, i1, f1],
     ModelTables,
 )
-SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2, f1], Schedule)
+SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2, f1, f3, i1, i1], Schedule)
 
 
 class Filtered(NamedTuple):

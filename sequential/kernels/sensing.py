@@ -58,7 +58,7 @@ def process_jacobian(model, x, u, row, dt, after, out):
 
 @inlined
 def measure(model, plan, reading, x, x_at, expected, residual):
-    """Expected measurement at x, and residual = local(expected, z)."""
+    """Expected measurement at x, and residual = local(expected, z), zero where a component is missing."""
     s = plan.sensor[reading]
     z_at = reading * plan.z.shape[1]
     call(
@@ -66,6 +66,10 @@ def measure(model, plan, reading, x, x_at, expected, residual):
         model.sensor_params, model.sensor_params_at[s], expected, 0,
     )  # fmt: skip
     local(model.z_table, model.z_first[s], model.z_first[s + 1], expected, 0, plan.z_flat, z_at, residual, 0)
+    if plan.rows[reading] < model.z_dim[s]:
+        for i in range(model.z_dim[s]):
+            if math.isnan(plan.z[reading, i]):
+                residual[i] = 0.0
 
 
 @bare
@@ -96,18 +100,26 @@ def difference_sensor(model, plan, reading, x, x_at, expected, flat, out):
 
 @inlined
 def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
-    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` as from `scratch_size`."""
+    """H (m, d) at x, declared or differenced, into the first rows of out; `flat` as from `scratch_size`.
+
+    Rows of missing components are zero: with their unit variance in the schedule they say nothing.
+    """
     s = plan.sensor[reading]
     if model.observe_jacobian[s] == 0:
         difference_sensor(model, plan, reading, x, x_at, expected, flat, out)
-        return
-    call(
-        model.observe_jacobian[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
-        model.sensor_params, model.sensor_params_at[s], flat, 0,
-    )  # fmt: skip
-    for i in range(model.z_dim[s]):
-        for j in range(model.d):
-            out[i, j] = flat[i * model.d + j]
+    else:
+        call(
+            model.observe_jacobian[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
+            model.sensor_params, model.sensor_params_at[s], flat, 0,
+        )  # fmt: skip
+        for i in range(model.z_dim[s]):
+            for j in range(model.d):
+                out[i, j] = flat[i * model.d + j]
+    if plan.rows[reading] < model.z_dim[s]:
+        for i in range(model.z_dim[s]):
+            if math.isnan(plan.z[reading, i]):
+                for j in range(model.d):
+                    out[i, j] = 0.0
 
 
 @bare_as(f0(i0, f0, f0))

@@ -149,7 +149,7 @@ def look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
     """Regress a reading on the state: residual, slope H (m, d), Ω + R in `noise`; False: P indefinite."""
     points, lower = sigma[0], sigma[4]
     images, tangents, expected, residual, move = seen
-    s = plan.sensor[reading]
+    s, given = plan.sensor[reading], plan.noise_cov[plan.noise_row[reading]]
     m, n, d = model.z_dim[s], model.n, model.d
     width, size, wide = plan.context.shape[1], plan.z.shape[1], images.shape[1]
     first, last, at = model.z_first[s], model.z_first[s + 1], model.sensor_params_at[s]
@@ -163,6 +163,12 @@ def look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
         )  # fmt: skip
     mean_of(model.z_table, first, last, model.z_size[s], m, 2 * d, images, weights, expected, tangents, move)
     local(model.z_table, first, last, expected, 0, plan.z.reshape(-1), reading * size, residual, 0)
+    if plan.rows[reading] < m:
+        for a in range(m):
+            if math.isnan(plan.z[reading, a]):
+                residual[a] = 0.0
+                for i in range(2 * d + 1):
+                    tangents[i, a] = 0.0
     regress(tangents, lower, d, m, weights[0], h)
     second_moment(tangents, weights, 2 * d, m, noise)
     share = 0.25 / (weights[0] * weights[0])
@@ -171,7 +177,7 @@ def look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
             explained = 0.0
             for j in range(1, d + 1):
                 explained += (tangents[j, a] - tangents[j + d, a]) * (tangents[j, b] - tangents[j + d, b])
-            noise[a, b] += model.noise_cov[s, a, b] - share * explained
+            noise[a, b] += given[a, b] - share * explained
     return True
 
 
@@ -180,20 +186,20 @@ def absorb(model, plan, reading, x, p, weights, sigma, seen, update, work, out):
     """Update by one reading; returns its log likelihood, 0 if gated, NaN if S or P is indefinite."""
     h, cross, gain, innovation_cov, factor, noise, scaled, delta = update
     residual = seen[3]
-    s = plan.sensor[reading]
+    s, given = plan.sensor[reading], plan.noise_cov[plan.noise_row[reading]]
     m, d = model.z_dim[s], model.d
     if not look(model, plan, reading, x, p, weights, sigma, seen, h, noise):
         return math.nan
     nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, factor, cross, gain)
-    verdict = admit(model, reading, s, m, nis, residual, innovation_cov, out)
+    verdict = admit(model, plan, reading, nis, residual, innovation_cov, out)
     if verdict < 1:
         return math.nan if verdict < 0 else 0.0
-    log_likelihood = -0.5 * (nis + log_det + m * LOG_TWO_PI)
-    weight = loss_weight(model.loss[s], model.loss_k[s], nis / m)
+    log_likelihood = -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
+    weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
     if weight < 1.0:
         for i in range(m):
             for j in range(m):
-                noise[i, j] += model.noise_cov[s, i, j] * (1.0 / weight - 1.0)
+                noise[i, j] += given[i, j] * (1.0 / weight - 1.0)
         gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, factor, cross, gain)
     for i in range(d):
         delta[i] = 0.0

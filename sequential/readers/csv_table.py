@@ -140,9 +140,20 @@ def stamps(table: CsvTable, name: str, readings: Sequence[Reading]) -> NDArray[n
 
 
 def numbers(
-    table: CsvTable, columns: Sequence[str], lines: Sequence[int], cells: list[list[str]]
+    table: CsvTable,
+    columns: Sequence[str],
+    lines: Sequence[int],
+    cells: list[list[str]],
+    *,
+    missing: bool = False,
 ) -> NDArray[np.float64]:
-    """(N, m) finite numbers; raises `FileFormatError` or `NotFiniteError` naming line and column."""
+    """(N, m) finite numbers, or NaN where `missing` allows it.
+
+    Raises
+    ------
+    FileFormatError, NotFiniteError
+        naming line and column.
+    """
     try:
         found = np.array(cells, dtype=np.float64).reshape(len(cells), len(columns))
     except ValueError:
@@ -152,7 +163,7 @@ def numbers(
         raise FileFormatError(
             f"{table.where(lines[k])}, column {columns[j]!r}: {cells[k][j]!r} is not a number"
         ) from None
-    if len(bad := np.argwhere(~np.isfinite(found))):
+    if len(bad := np.argwhere(np.isinf(found) if missing else ~np.isfinite(found))):
         k, j = int(bad[0][0]), int(bad[0][1])
         raise NotFiniteError(
             f"{table.where(lines[k])}, column {columns[j]!r}: {cells[k][j]} where a number is needed; "

@@ -69,7 +69,7 @@ def _stream(name: str, stream: str, arrays: dict[str, Any]) -> Stream:
             f"{name}: the array '{stream}_covers' is {covers!r}; it says 'after' or 'before'"
         )
     try:
-        return Stream(t, values, context, covers)  # type: ignore[arg-type]
+        return Stream(t, values, context, covers, arrays.get(f"{stream}_noise_cov"))  # type: ignore[arg-type]
     except DataError as fault:
         raise type(fault)(f"{name}: stream {stream!r}: {fault}") from None
 
@@ -82,5 +82,7 @@ def write_npz(path: str | os.PathLike[str], log: SensorLog) -> None:
         arrays[f"{name}_covers"] = np.array(stream.covers)
         if stream.context is not None:
             arrays[f"{name}_context"] = stream.context
+        if stream.noise_cov is not None:
+            arrays[f"{name}_noise_cov"] = stream.noise_cov
     with replacing(path, "wb") as file:
         np.savez(file, **arrays)

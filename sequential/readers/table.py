@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -166,7 +167,7 @@ def _streams(table: CsvTable, found: Found, lines: dict[str, list[int]]) -> dict
             )
         at = lines[name] = [reading.line for reading in readings]
         known = numbers(table, context, at, [r.context for r in readings]) if context else None
-        measured = numbers(table, values, at, [r.values for r in readings])
+        measured = numbers(table, values, at, [r.values for r in readings], missing=True)
         streams[name] = Stream(stamps(table, name, readings), measured, known)
     if not streams:
         raise MissingStreamError(
@@ -193,7 +194,7 @@ def _with_covers(path: str, streams: dict[str, Stream], covers: Mapping[str, Cov
                 f"{path}: 'covers {name}={side}' must name a stream of the log ({', '.join(streams)}) "
                 "and say 'after' or 'before'"
             )
-    return {name: Stream(s.t, s.values, s.context, covers.get(name, s.covers)) for name, s in streams.items()}
+    return {name: replace(s, covers=covers.get(name, s.covers)) for name, s in streams.items()}
 
 
 def _require_sound(path: str, name: str, stream: Stream, lines: list[int] | None) -> None:
@@ -212,11 +213,20 @@ def _require_sound(path: str, name: str, stream: Stream, lines: list[int] | None
 def write_log(path: str | os.PathLike[str], log: SensorLog) -> None:
     """Write a log as NPZ where the name ends in `.npz`, else as long CSV; reading it gives the same numbers.
 
-    The file appears whole or not at all.
+    The file appears whole or not at all.  Missing components are written as nan.
+
+    Raises
+    ------
+    FileFormatError
+        where a CSV would lose the covariances that a stream brings.
     """
     if Path(path).suffix.lower() == ".npz":
         write_npz(path, log)
         return
+    if heavy := [name for name, stream in log.items() if stream.noise_cov is not None]:
+        raise FileFormatError(
+            f"{path}: a CSV has no place for the noise_cov of {heavy[0]!r}; write the log as .npz"
+        )
     widths = [(s.values.shape[1], 0 if s.context is None else s.context.shape[1]) for s in log.values()]
     most = max((v for v, _ in widths), default=0), max((c for _, c in widths), default=0)
     header = ["t", "stream", *(f"v{i}" for i in range(most[0])), *(f"c{i}" for i in range(most[1]))]

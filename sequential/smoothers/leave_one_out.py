@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.compile import compiled
+from sequential.filters.solution import masked
 from sequential.history import Innovations, Run
 from sequential.model import Loss, SensorModel
 from sequential.timeline import Problem, sealed
@@ -42,15 +43,21 @@ def leave_one_out(problem: Problem, smoothed: Run, forward: Run | None = None) -
         m = sensor.manifold.dim
         r, h, p = residual[rows, :m], jacobian[rows, :m], smoothed.cov[node_of[rows]]
         accepted = np.ones(len(rows), bool) if forward is None else forward.innovations[name].accepted
-        weight = _weights(sensor, r, None if forward is None else forward.innovations[name])
+        noise = problem.noises(rows, m)
+        weight = _weights(sensor, r, noise, None if forward is None else forward.innovations[name])
         left, cov = np.empty_like(r), np.empty((len(rows), m, m))
         left[accepted], cov[accepted] = _without(
-            r[accepted], h[accepted], p[accepted], sensor.noise_cov, weight[accepted]
+            r[accepted], h[accepted], p[accepted], noise[accepted], weight[accepted]
         )
         out = ~accepted
-        left[out], cov[out] = r[out], h[out] @ p[out] @ np.swapaxes(h[out], 1, 2) + sensor.noise_cov
+        left[out], cov[out] = r[out], h[out] @ p[out] @ np.swapaxes(h[out], 1, 2) + noise[out]
         found[name] = Innovations(
-            problem.reading_t[rows], problem.reading_row[rows], left, cov, accepted, "leave-one-out"
+            problem.reading_t[rows],
+            problem.reading_row[rows],
+            masked(problem, rows, left),
+            cov,
+            accepted,
+            "leave-one-out",
         )
     return found
 
@@ -69,13 +76,13 @@ def look_back(problem: Problem, trajectory: Array) -> tuple[Array, Array, NDArra
     return residual, jacobian, node_of
 
 
-def _weights(sensor: SensorModel, r: Array, filtered: Innovations | None) -> Array:
+def _weights(sensor: SensorModel, r: Array, noise: Array, filtered: Innovations | None) -> Array:
     """(M,) weights that the loss gave: by the innovation in a filter, by the residual in a batch."""
     if sensor.loss is None:
         return np.ones(len(r))
     if filtered is not None:
-        return loss_weights(sensor.loss, filtered.nis() / r.shape[1])
-    return loss_weights(sensor.loss, np.einsum("ni,ij,nj->n", r, np.linalg.inv(sensor.noise_cov), r))
+        return loss_weights(sensor.loss, filtered.nis() / filtered.dof())
+    return loss_weights(sensor.loss, np.einsum("ni,nij,nj->n", r, np.linalg.inv(noise), r))
 
 
 def loss_weights(loss: Loss, squared: Array) -> Array:

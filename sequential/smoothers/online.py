@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.compile import compiled
+from sequential.filters.solution import masked
 from sequential.history import Innovations
 from sequential.smoothers.leave_one_out import look_back
 from sequential.timeline import Problem
@@ -45,11 +46,11 @@ def predicted_innovations(problem: Problem, mean: Array, cov: Array) -> Mapping[
         rows = np.flatnonzero(problem.schedule.sensor == index)
         m = sensor.manifold.dim
         h = jacobian[rows, :m]
-        spread = h @ before[node_of[rows]] @ np.swapaxes(h, 1, 2) + sensor.noise_cov
+        spread = h @ before[node_of[rows]] @ np.swapaxes(h, 1, 2) + problem.noises(rows, m)
         found[name] = Innovations(
             problem.reading_t[rows],
             problem.reading_row[rows],
-            residual[rows, :m],
+            masked(problem, rows, residual[rows, :m]),
             spread,
             np.ones(len(rows), dtype=bool),
         )

@@ -35,9 +35,9 @@ def innovation_log_likelihood(run: Run, model: StateSpace) -> float:
             continue
         from scipy.special import chdtri
 
-        cov, m = seen.cov[~seen.accepted], seen.cov.shape[-1]
+        cov, m = seen.cov[~seen.accepted], seen.dof()[~seen.accepted]
         log_det = np.linalg.slogdet(cov)[1]
-        worst = float(chdtri(m, 1.0 - gate))
+        worst = chdtri(m, 1.0 - gate)
         total -= 0.5 * float(np.sum(log_det + worst + m * math.log(2.0 * math.pi)))
     return total
 

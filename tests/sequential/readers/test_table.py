@@ -146,7 +146,11 @@ LONG_FAULTS = {
     "a reading of nothing": ("0.1,gps,,", FileFormatError, "line 3: 'gps' has 0 values here"),
     "a hole": ("0.1,gps,,2", FileFormatError, "line 3, column 'v0': '' is not a number"),
     "text": ("0.1,gps,1,fix", FileFormatError, "line 3, column 'v1': 'fix' is not a number"),
-    "NaN": ("0.1,gps,1,nan", NotFiniteError, "line 3, column 'v1': nan where a number is needed; leave out"),
+    "infinity": (
+        "0.1,gps,1,inf",
+        NotFiniteError,
+        "line 3, column 'v1': inf where a number is needed",
+    ),
     "a bad stamp": (
         "noon,gps,1,2",
         FileFormatError,
@@ -247,10 +251,10 @@ NPZ_FAULTS = {
         FileFormatError,
         "it says 'after' or 'before'",
     ),
-    "NaN": (
-        {"gps_t": [0.0], "gps": [np.nan]},
+    "infinity": (
+        {"gps_t": [0.0], "gps": [np.inf]},
         NotFiniteError,
-        r"log\['gps'\] holds NaN or infinity at sample 0",
+        r"log\['gps'\] holds infinity, or NaN in its context, at sample 0",
     ),
     "NaN stamp": ({"gps_t": [np.nan], "gps": [1.0]}, NotFiniteError, "stamp 0 is nan"),
     "backwards": (
