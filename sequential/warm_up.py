@@ -18,8 +18,18 @@ from sequential.errors import ModelError
 __all__ = ["warm_up"]
 
 # Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
-SMALL = ("matrices", "poses", "charts", "belief", "bierman", "sensing")
-KERNELS = ("extended", "unscented", "iterated", "linearize", "smoothing", "looking", "walking")
+SMALL = ("matrices", "poses", "charts", "belief", "bierman", "orthogonal", "sensing")
+KERNELS = (
+    "extended",
+    "unscented",
+    "factored",
+    "information",
+    "iterated",
+    "linearize",
+    "smoothing",
+    "looking",
+    "walking",
+)
 MODELS = ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared")
 
 

@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 
 from sequential.compile import compiled
+from sequential.filters.forms import kernel_of, named, require_form, require_informed
 from sequential.filters.solution import allocate, as_run, require_finite, require_solved
 from sequential.history import Report, Run
 from sequential.timeline import Problem
@@ -24,43 +25,63 @@ class ExtendedKalmanFilter:
     Parameters
     ----------
     keep : keep predictions and transitions, which smoothers need; costs a third of the time
+    form : how the covariance is carried, see `sequential.filters.forms`
     """
 
     keep: bool = False
-    name = "ekf"
+    form: str = "joseph"
+
+    def __post_init__(self) -> None:
+        require_form(self.form)
+
+    @property
+    def name(self) -> str:
+        """Short name, with the form behind it where it is not the usual one."""
+        return named("ekf", self.form)
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        return filter_problem(problem, self.name, 1, keep=self.keep)
+        return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
 
 
 @dataclass(frozen=True, slots=True)
 class IteratedExtendedKalmanFilter:
-    """Iterate each update to the maximum a posteriori estimate (Bell and Cathey 1993)."""
+    """Iterate each update to the maximum a posteriori estimate (Bell and Cathey 1993).
+
+    Takes every form but "information", which keeps no prediction to iterate from.
+    """
 
     max_iterations: int = 10
     keep: bool = False
-    name = "iekf"
+    form: str = "joseph"
+
+    def __post_init__(self) -> None:
+        require_form(self.form, iterated=True)
+
+    @property
+    def name(self) -> str:
+        """Short name, with the form behind it where it is not the usual one."""
+        return named("iekf", self.form)
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        return filter_problem(problem, self.name, max(self.max_iterations, 2), keep=self.keep)
+        iterations = max(self.max_iterations, 2)
+        return filter_problem(problem, self.name, iterations, keep=self.keep, form=self.form)
 
 
-def filter_problem(problem: Problem, name: str, iterations: int, *, keep: bool) -> Run:
+def filter_problem(problem: Problem, name: str, iterations: int, *, keep: bool, form: str = "joseph") -> Run:
     """Run the compiled filter and read its arrays."""
-    from sequential.kernels.extended import filter_log
     from sequential.kernels.records import Filtered
 
     whole = compiled(problem.model)
     out = Filtered(*allocate(problem, whole.tables, keep=keep))
     prior = problem.model.prior
+    filter_log = kernel_of(form, iterations)
     began = time.perf_counter()
-    log_likelihood, failed = filter_log(
-        whole.tables, problem.schedule, prior.mean, prior.cov, iterations, int(keep), out
-    )
+    log_likelihood, failed = filter_log(whole.tables, problem.schedule, prior.mean, prior.cov, int(keep), out)
     seconds = time.perf_counter() - began
     whole.raise_failures()
+    require_informed(problem, form, failed, out)
     require_solved(problem, failed, out)
     require_finite(problem, out.mean)
     rejected = int((out.accepted == 0).sum())

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from sequential.errors import NonlinearModelError
 from sequential.filters.extended import filter_problem
+from sequential.filters.forms import named, require_form
 from sequential.history import Run
 from sequential.model import StateSpace
 from sequential.timeline import Problem
@@ -15,15 +16,29 @@ __all__ = ["KalmanFilter"]
 
 @dataclass(frozen=True, slots=True)
 class KalmanFilter:
-    """Exact for linear models with Gaussian noise (Kalman 1960); refuses any other model."""
+    """Exact for linear models with Gaussian noise (Kalman 1960); refuses any other model.
+
+    Parameters
+    ----------
+    keep : keep predictions and transitions, which smoothers need
+    form : how the covariance is carried, see `sequential.filters.forms`
+    """
 
     keep: bool = False
-    name = "kf"
+    form: str = "joseph"
+
+    def __post_init__(self) -> None:
+        require_form(self.form)
+
+    @property
+    def name(self) -> str:
+        """Short name, with the form behind it where it is not the usual one."""
+        return named("kf", self.form)
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log; raises `NonlinearModelError` where the model is not linear."""
         require_linear(problem.model)
-        return filter_problem(problem, self.name, 1, keep=self.keep)
+        return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
 
 
 def require_linear(model: StateSpace) -> None:

@@ -24,6 +24,7 @@ INLINED = (
     "kernels/moving.py",
     "kernels/records.py",
     "kernels/matrices.py",
+    "kernels/orthogonal.py",
     "kernels/charts.py",
     "kernels/poses.py",
     "kernels/sensing.py",

@@ -1,0 +1,231 @@
+"""The extended Kalman filter over a whole log in information form: Y = P⁻¹ and the information vector Y δ.
+
+Y is kept as U D Uᵀ, and the two halves of the filter change places (Bierman 1977, section X; Anderson and
+Moore 1979, section 6.3): a reading adds the columns of Hᵀ R^-½, which is a matter of orthogonalising, and the
+noise of a step is taken out column by column with Bierman's update, as if it were a reading of variance 1/q.
+So Q may be singular or zero; the transition must be invertible.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+
+from sequential.kernels.arrays import b0, f0, f1, f2, i0, w1, w2
+from sequential.kernels.belief import LOG_TWO_PI, admit, gain_and_innovation
+from sequential.kernels.bierman import decorrelate, factor_ud, update_ud_by_scalar
+from sequential.kernels.call import bare, bare_as, call, inlined
+from sequential.kernels.charts import retract
+from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply
+from sequential.kernels.orthogonal import orthogonalise
+from sequential.kernels.records import FILTERED, FINISHED, MODEL, SCHEDULE
+from sequential.kernels.sensing import loss_weight, measure, process_jacobian, scratch_size, sensor_jacobian
+
+__all__ = ["filter_information"]
+
+SINGULAR = 1e-14  # a pivot of a transition below this share of its column's largest entry
+
+
+@bare_as(b0(f2, i0, w2, w2))
+def invert(a, d, work, out):
+    """out = a⁻¹ by elimination with row exchanges; returns False where a (d, d) is singular."""
+    copy_matrix(a, work)
+    fill_diagonal(out, 1.0)
+    for j in range(d):
+        best, largest = j, 0.0
+        for i in range(d):
+            largest = max(largest, abs(a[i, j]))
+            if i > j and abs(work[i, j]) > abs(work[best, j]):
+                best = i
+        pivot = work[best, j]
+        if not abs(pivot) > SINGULAR * largest:
+            return False
+        for k in range(d):
+            work[best, k], work[j, k] = work[j, k], work[best, k] / pivot
+            out[best, k], out[j, k] = out[j, k], out[best, k] / pivot
+        for i in range(d):
+            s = work[i, j]
+            if i != j and s != 0.0:
+                for k in range(d):
+                    work[i, k] -= s * work[j, k]
+                    out[i, k] -= s * out[j, k]
+    return True
+
+
+@bare_as(b0(f2, f1, i0, w2, w2))
+def covariance(u, diagonal, d, inverse, p):
+    """P = U⁻ᵀ D⁻¹ U⁻¹, with U⁻¹ left in `inverse`; returns False where the information is singular."""
+    for j in range(d):
+        if not diagonal[j] > 0.0:
+            return False
+        for i in range(d):
+            inverse[i, j] = 1.0 if i == j else 0.0
+        for i in range(j - 1, -1, -1):
+            s = 0.0
+            for k in range(i + 1, j + 1):
+                s -= u[i, k] * inverse[k, j]
+            inverse[i, j] = s
+    for i in range(d):
+        for j in range(i + 1):
+            s = 0.0
+            for k in range(j + 1):
+                s += inverse[k, i] * inverse[k, j] / diagonal[k]
+            p[i, j] = s
+            p[j, i] = s
+    return True
+
+
+@bare_as(types.void(f2, f1, i0, w1))
+def solve_ud(u, diagonal, d, b):
+    """b <- (U D Uᵀ)⁻¹ b."""
+    for i in range(d - 1, -1, -1):
+        for k in range(i + 1, d):
+            b[i] -= u[i, k] * b[k]
+    for i in range(d):
+        b[i] /= diagonal[i]
+        for k in range(i):
+            b[i] -= u[k, i] * b[k]
+
+
+@bare_as(b0(w2, w1, f2, f2, f0, f1, i0, i0, w1, w2, w2, w2, w2, w1))
+def inform(u, diagonal, h, noise, weight, residual, m, d, delta, rows, lower, vectors, array, weights):
+    """Add Hᵀ (R/w)⁻¹ H to U D Uᵀ; delta = Y⁻¹ Hᵀ (R/w)⁻¹ residual.  False: R is singular."""
+    white, variance = vectors[0], vectors[1]
+    decorrelate(h, noise, weight, residual, m, d, rows, white, variance, lower)
+    for i in range(d):
+        delta[i] = 0.0
+        weights[i] = diagonal[i]
+        for j in range(d):
+            array[i, j] = u[i, j]
+    for k in range(m):
+        if not variance[k] > 0.0:
+            return False
+        weights[d + k] = 1.0 / variance[k]
+        for i in range(d):
+            array[i, d + k] = rows[k, i]
+            delta[i] += rows[k, i] * white[k] / variance[k]
+    orthogonalise(array, weights, d, d + m, u, diagonal)
+    solve_ud(u, diagonal, d, delta)
+    return True
+
+
+@inlined
+def predict_information(model, plan, node, x, u, diagonal, phi, keep, work):
+    """Carry mean and information (and phi with `keep`) along the steps to a node; False: it cannot be."""
+    d, width = model.d, plan.inputs.shape[1]
+    f, flat, after, q, source, variance, array, weights, inverse, gain, projected, column = work
+    for s in range(plan.step_ptr[node], plan.step_ptr[node + 1]):
+        row, dt = plan.step_input[s] * width, plan.step_dt[s]
+        call(model.step, x, 0, plan.inputs, row, dt, model.params, 0, after, 0)
+        process_jacobian(model, x, plan.inputs, plan.step_input[s], dt, after, f)
+        fill_diagonal(q, 0.0)
+        call(model.noise, x, 0, plan.inputs, row, dt, model.params, 0, q, 0)
+        copy_vector(after, x)
+        if keep != 0:
+            multiply(f, phi, flat, d, d, d)
+            copy_matrix(flat, phi)
+        if factor_ud(q, d, source, variance) > 0 or not invert(f, d, flat, inverse):
+            return False
+        for i in range(d):
+            weights[i] = diagonal[i]
+            for j in range(d):
+                total = 0.0
+                for k in range(j + 1):
+                    total += inverse[k, i] * u[k, j]
+                array[i, j] = total
+        orthogonalise(array, weights, d, d, u, diagonal)
+        for k in range(d):
+            if variance[k] > 0.0:
+                for i in range(d):
+                    column[i] = source[i, k]
+                update_ud_by_scalar(u, diagonal, column, 1.0 / variance[k], d, gain, projected)
+    return True
+
+
+@inlined
+def absorb(model, plan, reading, x, u, diagonal, p, update, work, expected, residual, out):
+    """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if it cannot be."""
+    s = plan.sensor[reading]
+    m, d, blocks = model.z_dim[s], model.d, len(model.table)
+    h, flat, innovation_cov, delta, cross, gain, lower, vectors = update
+    noise = plan.noise_cov[plan.noise_row[reading]]
+    measure(model, plan, reading, x, 0, expected, residual)
+    sensor_jacobian(model, plan, reading, x, 0, expected, flat, h)
+    nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
+    verdict = admit(model, plan, reading, nis, residual, innovation_cov, out)
+    if verdict < 1:
+        return math.nan if verdict < 0 else 0.0
+    weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
+    informed = inform(
+        u, diagonal, h, noise, weight, residual, m, d, delta, cross, lower, vectors, work[6], work[7]
+    )
+    if not informed or not covariance(u, diagonal, d, work[8], p):
+        return math.nan
+    retract(model.table, 0, blocks, x, 0, delta, 0, x, 0)
+    return -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
+
+
+@bare
+def filter_nodes(model, plan, x, u, diagonal, p, phi, work, update, expected, residual, keep, out):
+    """The loop of `filter_information`, with every array at hand."""
+    log_likelihood = 0.0
+    for node in range(len(plan.reading_ptr) - 1):
+        if keep != 0:
+            fill_diagonal(phi, 1.0)
+        failed = -1
+        moved = predict_information(model, plan, node, x, u, diagonal, phi, keep, work)
+        if not moved or not covariance(u, diagonal, model.d, work[8], p):
+            failed = -2 - node
+        if keep != 0:
+            copy_vector(x, out.predicted_mean[node])
+            copy_matrix(p, out.predicted_cov[node])
+            copy_matrix(phi, out.transition[node])
+        reading = plan.reading_ptr[node]
+        while failed == -1 and reading < plan.reading_ptr[node + 1]:
+            gained = absorb(model, plan, reading, x, u, diagonal, p, update, work, expected, residual, out)
+            if math.isnan(gained):
+                failed = reading
+            else:
+                log_likelihood += gained
+            reading += 1
+        copy_vector(x, out.mean[node])
+        copy_matrix(p, out.cov[node])
+        if failed != -1:
+            return log_likelihood, failed
+    return log_likelihood, -1
+
+
+@njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, FILTERED), cache=True, error_model="numpy")
+def filter_information(model, plan, prior_mean, prior_cov, keep, out):
+    """Run the filter; returns (log likelihood, code).
+
+    The code is -1, or the reading at which S or R was not positive definite, or -2 - k where the way to node
+    k has a singular transition, an indefinite noise, or loses all information on a direction.
+    """
+    n, d, widest = model.n, model.d, plan.z.shape[1]
+    x, p, phi = prior_mean.copy(), prior_cov.copy(), np.eye(d)
+    u, diagonal = np.empty((d, d)), np.empty(d)
+    work = (
+        np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)), np.empty((d, d)), np.empty(d),
+        np.empty((d, d + widest)), np.empty(d + widest), np.empty((d, d)), np.empty(d), np.empty(d),
+        np.empty(d),
+    )  # fmt: skip
+    flat = np.empty(scratch_size(n, d, widest))
+    update = (
+        np.empty((widest, d)), flat, np.empty((widest, widest)), np.empty(d), np.empty((widest, d)),
+        np.empty((widest, d)), np.empty((widest, widest)), np.empty((2, max(widest, d))),
+    )  # fmt: skip
+    # Y = U⁻ᵀ D⁻¹ U⁻¹ of the prior's factors, made triangular the other way round
+    factor_ud(prior_cov, d, u, diagonal)
+    if not covariance(u, diagonal, d, work[8], p):
+        return 0.0, -2
+    for j in range(d):
+        work[7][j] = 1.0 / diagonal[j]
+        for i in range(d):
+            work[6][i, j] = work[8][j, i]
+    orthogonalise(work[6], work[7], d, d, u, diagonal)
+    return filter_nodes(
+        model, plan, x, u, diagonal, p, phi, work, update, np.empty(widest), np.empty(widest), keep, out
+    )
