@@ -12,6 +12,7 @@
 (3, 2)
 """
 
+from sequential.discretise import van_loan
 from sequential.errors import FactorlabError
 from sequential.filters import (
     ExtendedKalmanFilter,
@@ -24,8 +25,14 @@ from sequential.log import SensorLog, Stream
 from sequential.manifold import SE2, SE3, SO2, SO3, NavState, Product, Vector
 from sequential.model import Gaussian, Loss, StateSpace
 from sequential.models import (
+    ConstantAcceleration,
     ConstantVelocity,
+    ContinuousProcess,
+    CoordinatedTurn,
     Direction,
+    GaussMarkov,
+    Independent,
+    LinearProcess,
     LinearSensor,
     Position,
     Process,
@@ -33,9 +40,11 @@ from sequential.models import (
     Range,
     RangeBearing,
     Sensor,
+    Singer,
     Strapdown,
     Unicycle,
     inertial_state,
+    tabulated_input,
 )
 from sequential.noise import ImuNoise, diagonal
 from sequential.run import Estimator, run
@@ -49,19 +58,25 @@ __all__ = [
     "SE3",
     "SO2",
     "SO3",
+    "ConstantAcceleration",
     "ConstantVelocity",
+    "ContinuousProcess",
+    "CoordinatedTurn",
     "Direction",
     "Estimator",
     "ExtendedKalmanFilter",
     "FactorlabError",
     "FixedLagSmoother",
+    "GaussMarkov",
     "Gaussian",
     "ImuNoise",
+    "Independent",
     "Innovations",
     "IteratedExtendedKalmanFilter",
     "IteratedSmoother",
     "KalmanFilter",
     "Knob",
+    "LinearProcess",
     "LinearSensor",
     "Loss",
     "NavState",
@@ -79,6 +94,7 @@ __all__ = [
     "Sensor",
     "SensorLog",
     "Simulation",
+    "Singer",
     "StateSpace",
     "Strapdown",
     "Stream",
@@ -91,5 +107,7 @@ __all__ = [
     "prepare",
     "run",
     "simulate",
+    "tabulated_input",
     "tune",
+    "van_loan",
 ]

@@ -70,17 +70,18 @@ def check_jacobians(model: StateSpace, dt: float = 0.01, seed: int = 0) -> None:
     for scale in (0.0, 0.3):
         x = manifold.retract(model.prior.mean, scale * rng.standard_normal(manifold.dim))
         what = f"{type(model.process).__name__}.step"
-        _check(model.process_functions, manifold, manifold, x, rng, dt, what)
+        u = rng.standard_normal(model.process_functions.inputs)
+        if getattr(model.process, "rows", 0):
+            u[-1] = 0.0  # a row of its table
+        _check(model.process_functions, manifold, manifold, x, u, dt, what)
         for name, sensor in model.sensors.items():
             what = f"sensors[{name!r}].observe"
-            _check(model.sensor_functions[name], manifold, sensor.manifold, x, rng, 0.0, what)
+            f = model.sensor_functions[name]
+            # a context is mostly an index (which landmark): zero is the one value that always exists
+            _check(f, manifold, sensor.manifold, x, np.zeros(max(f.inputs, 1)), 0.0, what)
 
 
-def _check(
-    f: Functions, domain: Manifold, image: Manifold, x: Array, rng: np.random.Generator, dt: float, what: str
-) -> None:
-    # A context is mostly an index (which landmark): zero is the one value that always exists.
-    u = rng.standard_normal(f.inputs) if dt else np.zeros(max(f.inputs, 1))
+def _check(f: Functions, domain: Manifold, image: Manifold, x: Array, u: Array, dt: float, what: str) -> None:
 
     def value(at: Array) -> Array:
         return evaluate(f.value, at, u, dt, f.params, image.size)

@@ -146,6 +146,9 @@ class ProcessModel(abc.ABC):
     def functions(self, manifold: Manifold) -> Functions:
         """The process lowered onto `manifold`; raises `ModelError` where the two do not fit."""
 
+    def require_inputs(self, values: Array, where: str) -> None:  # noqa: B027 - most take any input
+        """Raise `DataError` where inputs (N, m) are not what the process can take; `where` names them."""
+
 
 class SensorModel(abc.ABC):
     """What a sensor sees.  Final classes in `sequential.models`; users write `Sensor(observe=…)`."""

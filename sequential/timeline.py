@@ -148,6 +148,7 @@ def _steps(
     stream = log[model.input]
     require_columns(model.input, stream, model.process_functions.inputs, 0)
     _require_driven(model.input, stream)
+    model.process.require_inputs(stream.values, f"log[{model.input!r}]")
     if not len(stream):
         msg = f"log[{model.input!r}] drives the process and is empty"
         raise MissingStreamError(msg)

@@ -30,7 +30,17 @@ KERNELS = (
     "looking",
     "walking",
 )
-MODELS = ("motion", "unicycle", "inertial", "position", "ranging", "direction", "declared")
+MODELS = (
+    "motion",
+    "unicycle",
+    "inertial",
+    "position",
+    "ranging",
+    "direction",
+    "declared",
+    "linear",
+    "exponential",
+)
 
 
 def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> None:

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from sequential.errors import ModelError
 from sequential.manifold import Manifold, Vector
 from sequential.model import Functions, ProcessModel, as_params
+from sequential.models.continuous import Dynamics, across
 from sequential.models.declared import density_noise
+from sequential.models.linear import require_flat
 from sequential.noise import require_covariance
 
 __all__ = ["ConstantVelocity", "RandomWalk"]
@@ -36,6 +38,13 @@ class RandomWalk(ProcessModel):
         n, d = manifold.size, manifold.dim
         cov = require_covariance(self.density, d, "the density of a RandomWalk", definite=False)
         return Functions(stay, stay_jacobian, as_params(d, cov, n), noise=density_noise)
+
+    def dynamics(self, manifold: Manifold) -> Dynamics:
+        """The equation dx = w on a flat state."""
+        n = manifold.size
+        require_flat(manifold, n, "RandomWalk as a differential equation")
+        cov = require_covariance(self.density, n, "the density of a RandomWalk", definite=False)
+        return Dynamics(np.zeros((n, n)), cov, np.zeros((n, 0)))
 
 
 def stay(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
@@ -83,6 +92,12 @@ class ConstantVelocity(ProcessModel):
             raise ModelError(msg)
         params = as_params(self.axes, self.acceleration_density)
         return Functions(coast, coast_jacobian, params, noise=acceleration_noise)
+
+    def dynamics(self, manifold: Manifold) -> Dynamics:
+        """The equation dp = v, dv = w."""
+        self.functions(manifold)
+        a, d = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, self.acceleration_density])
+        return Dynamics(across(a, self.axes), across(d, self.axes), np.zeros((2 * self.axes, 0)))
 
 
 def coast(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
