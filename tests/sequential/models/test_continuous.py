@@ -43,7 +43,7 @@ def test_it_is_the_matrix_exponential(name, dt):
     n, m = b.shape
     f, q, moved = matrices(process, manifold, dt, np.ones(max(m, 1)))
     expected = exponential(a * dt)
-    rounding = 1e-14 + 1e-16 * np.abs(a).sum() * dt  # the exponential's own condition number grows with ‖A dt‖
+    rounding = 1e-14 + 1e-16 * np.abs(a).sum() * dt  # its condition number grows with ‖A dt‖
     np.testing.assert_allclose(f, expected, rtol=0, atol=rounding * np.abs(expected).max())
     np.testing.assert_allclose(f, expm(a * dt), rtol=0, atol=1e-11 * np.abs(expected).max())
     assert np.abs(sq.van_loan(a, np.eye(n), density, dt)[1] - q).max() <= 1e-14 * np.abs(q).max()
