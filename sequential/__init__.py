@@ -16,11 +16,12 @@ from sequential.discretise import van_loan
 from sequential.errors import FactorlabError
 from sequential.filters import (
     ExtendedKalmanFilter,
+    InteractingMultipleModel,
     IteratedExtendedKalmanFilter,
     KalmanFilter,
     UnscentedKalmanFilter,
 )
-from sequential.history import Innovations, Prediction, Report, Run
+from sequential.history import Innovations, ModeHistory, Prediction, Report, Run
 from sequential.log import SensorLog, Stream
 from sequential.manifold import SE2, SE3, SO2, SO3, NavState, Product, Vector
 from sequential.model import Gaussian, Loss, StateSpace
@@ -72,6 +73,7 @@ __all__ = [
     "ImuNoise",
     "Independent",
     "Innovations",
+    "InteractingMultipleModel",
     "IteratedExtendedKalmanFilter",
     "IteratedSmoother",
     "KalmanFilter",
@@ -79,6 +81,7 @@ __all__ = [
     "LinearProcess",
     "LinearSensor",
     "Loss",
+    "ModeHistory",
     "NavState",
     "Position",
     "Prediction",

@@ -12,7 +12,7 @@ from sequential.errors import DataError
 from sequential.log import nanoseconds
 from sequential.manifold import Manifold, Product
 
-__all__ = ["Innovations", "Prediction", "Report", "Run"]
+__all__ = ["Innovations", "ModeHistory", "Prediction", "Report", "Run"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -77,6 +77,24 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ModeHistory:
+    """Several models of one system side by side, beside the combined estimate of a `Run`."""
+
+    probability: Array  # (N, J) of each model being in force; rows add up to one
+    mean: Array  # (J, N, n) what each model believes
+    cov: Array  # (J, N, d, d)
+
+    def __post_init__(self) -> None:
+        for values in (self.probability, self.mean, self.cov):
+            values.flags.writeable = False
+
+    def likeliest(self) -> Ints:
+        """(N,) index of the likeliest model."""
+        best: Ints = self.probability.argmax(axis=1)
+        return best
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """Estimates at the nodes of a problem.
 
@@ -91,6 +109,7 @@ class Run:
     log_likelihood: float
     report: Report
     predicted: Prediction | None = None
+    modes: ModeHistory | None = None  # of an estimator that interacts between models
 
     def __post_init__(self) -> None:
         for values in (self.t, self.mean, self.cov):

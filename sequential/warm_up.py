@@ -20,8 +20,10 @@ __all__ = ["warm_up"]
 # Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
 SMALL = ("matrices", "poses", "charts", "belief", "bierman", "orthogonal", "sensing")
 KERNELS = (
+    "multiple",
     "extended",
     "unscented",
+    "multiple_smoothing",
     "factored",
     "information",
     "iterated",

@@ -2,6 +2,13 @@
 
 from sequential.filters.extended import ExtendedKalmanFilter, IteratedExtendedKalmanFilter
 from sequential.filters.kalman import KalmanFilter
+from sequential.filters.multiple import InteractingMultipleModel
 from sequential.filters.unscented import UnscentedKalmanFilter
 
-__all__ = ["ExtendedKalmanFilter", "IteratedExtendedKalmanFilter", "KalmanFilter", "UnscentedKalmanFilter"]
+__all__ = [
+    "ExtendedKalmanFilter",
+    "InteractingMultipleModel",
+    "IteratedExtendedKalmanFilter",
+    "KalmanFilter",
+    "UnscentedKalmanFilter",
+]

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from sequential.filters.extended import ExtendedKalmanFilter
+from sequential.filters.multiple import InteractingMultipleModel
 from sequential.history import Report, Run
 from sequential.smoothers.leave_one_out import leave_one_out
+from sequential.smoothers.multiple import smooth_multiple
 from sequential.timeline import Problem
 
 __all__ = ["RauchTungStriebel"]
@@ -22,7 +24,7 @@ class RauchTungStriebel:
 
     Parameters
     ----------
-    filter : any recursive filter with a `keep` setting
+    filter : any recursive filter with a `keep` setting, or an `InteractingMultipleModel`
     leave_one_out : also predict each reading from all others (`Run.innovations`); costs 50 µs a reading
     """
 
@@ -38,6 +40,8 @@ class RauchTungStriebel:
         """Smooth the whole log."""
         from sequential.kernels.smoothing import smooth_history
 
+        if isinstance(self.filter, InteractingMultipleModel):
+            return smooth_multiple(self.filter, problem, self.name)
         forward = replace(self.filter, keep=True).solve(problem)
         before = forward.predicted
         assert before is not None  # noqa: S101 - keep=True, for the type checker
