@@ -73,7 +73,7 @@ class InteractingMultipleModel:
             )
         if self.filter.form != "joseph":
             raise ModelError(
-                f"InteractingMultipleModel mixes whole covariances, form='joseph'; got form={self.filter.form!r}"
+                f"InteractingMultipleModel mixes filters of form='joseph', got form={self.filter.form!r}"
             )
         if isinstance(self.filter, KalmanFilter):
             for model in self.models:
