@@ -49,6 +49,7 @@ from sequential.models import (
 )
 from sequential.noise import ImuNoise, diagonal
 from sequential.run import Estimator, run
+from sequential.signal import Complementary, Hampel, LowPass, MovingMean, SlidingMedian
 from sequential.simulate import Simulation, simulate
 from sequential.smoothers import FixedLagSmoother, IteratedSmoother, RauchTungStriebel
 from sequential.timeline import Problem, prepare
@@ -59,6 +60,7 @@ __all__ = [
     "SE3",
     "SO2",
     "SO3",
+    "Complementary",
     "ConstantAcceleration",
     "ConstantVelocity",
     "ContinuousProcess",
@@ -70,6 +72,7 @@ __all__ = [
     "FixedLagSmoother",
     "GaussMarkov",
     "Gaussian",
+    "Hampel",
     "ImuNoise",
     "Independent",
     "Innovations",
@@ -81,7 +84,9 @@ __all__ = [
     "LinearProcess",
     "LinearSensor",
     "Loss",
+    "LowPass",
     "ModeHistory",
+    "MovingMean",
     "NavState",
     "Position",
     "Prediction",
@@ -98,6 +103,7 @@ __all__ = [
     "SensorLog",
     "Simulation",
     "Singer",
+    "SlidingMedian",
     "StateSpace",
     "Strapdown",
     "Stream",
