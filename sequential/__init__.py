@@ -52,6 +52,7 @@ from sequential.run import Estimator, run
 from sequential.signal import Complementary, Hampel, LowPass, MovingMean, SlidingMedian
 from sequential.simulate import Simulation, simulate
 from sequential.smoothers import FixedLagSmoother, IteratedSmoother, RauchTungStriebel
+from sequential.steady_state import SteadyState, alpha_beta, steady_state
 from sequential.timeline import Problem, prepare
 from sequential.tuning import Knob, Tuning, tune
 
@@ -105,17 +106,20 @@ __all__ = [
     "Singer",
     "SlidingMedian",
     "StateSpace",
+    "SteadyState",
     "Strapdown",
     "Stream",
     "Tuning",
     "Unicycle",
     "UnscentedKalmanFilter",
     "Vector",
+    "alpha_beta",
     "diagonal",
     "inertial_state",
     "prepare",
     "run",
     "simulate",
+    "steady_state",
     "tabulated_input",
     "tune",
     "van_loan",
