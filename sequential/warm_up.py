@@ -18,7 +18,7 @@ from sequential.errors import ModelError
 __all__ = ["warm_up"]
 
 # Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
-SMALL = ("matrices", "poses", "charts", "belief", "bierman", "orthogonal", "sensing")
+SMALL = ("matrices", "poses", "charts", "belief", "bierman", "orthogonal", "informing", "sensing")
 KERNELS = (
     "multiple",
     "extended",

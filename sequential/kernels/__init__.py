@@ -23,6 +23,7 @@ INLINED = (
     "kernels/call.py",
     "kernels/moving.py",
     "kernels/records.py",
+    "kernels/informing.py",
     "kernels/matrices.py",
     "kernels/orthogonal.py",
     "kernels/mixing.py",

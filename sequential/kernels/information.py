@@ -13,102 +13,25 @@ import math
 import numpy as np
 from numba import njit, types
 
-from sequential.kernels.arrays import b0, f0, f1, f2, i0, w1, w2
-from sequential.kernels.belief import LOG_TWO_PI, admit, gain_and_innovation
-from sequential.kernels.bierman import decorrelate, factor_ud, update_ud_by_scalar
-from sequential.kernels.call import bare, bare_as, call, inlined
+from sequential.kernels.arrays import f1, f2
+from sequential.kernels.belief import LOG_TWO_PI, admit
+from sequential.kernels.bierman import factor_ud, update_ud_by_scalar
+from sequential.kernels.call import bare, call, inlined
 from sequential.kernels.charts import retract
-from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply
+from sequential.kernels.informing import covariance, inform, invert
+from sequential.kernels.matrices import (
+    copy_matrix,
+    copy_vector,
+    fill_diagonal,
+    multiply,
+    multiply_nt,
+    symmetrise,
+)
 from sequential.kernels.orthogonal import orthogonalise
 from sequential.kernels.records import FILTERED, FINISHED, MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight, measure, process_jacobian, scratch_size, sensor_jacobian
 
 __all__ = ["filter_information"]
-
-SINGULAR = 1e-14  # a pivot of a transition below this share of its column's largest entry
-
-
-@bare_as(b0(f2, i0, w2, w2))
-def invert(a, d, work, out):
-    """out = a⁻¹ by elimination with row exchanges; returns False where a (d, d) is singular."""
-    copy_matrix(a, work)
-    fill_diagonal(out, 1.0)
-    for j in range(d):
-        best, largest = j, 0.0
-        for i in range(d):
-            largest = max(largest, abs(a[i, j]))
-            if i > j and abs(work[i, j]) > abs(work[best, j]):
-                best = i
-        pivot = work[best, j]
-        if not abs(pivot) > SINGULAR * largest:
-            return False
-        for k in range(d):
-            work[best, k], work[j, k] = work[j, k], work[best, k] / pivot
-            out[best, k], out[j, k] = out[j, k], out[best, k] / pivot
-        for i in range(d):
-            s = work[i, j]
-            if i != j and s != 0.0:
-                for k in range(d):
-                    work[i, k] -= s * work[j, k]
-                    out[i, k] -= s * out[j, k]
-    return True
-
-
-@bare_as(b0(f2, f1, i0, w2, w2))
-def covariance(u, diagonal, d, inverse, p):
-    """P = U⁻ᵀ D⁻¹ U⁻¹, with U⁻¹ left in `inverse`; returns False where the information is singular."""
-    for j in range(d):
-        if not diagonal[j] > 0.0:
-            return False
-        for i in range(d):
-            inverse[i, j] = 1.0 if i == j else 0.0
-        for i in range(j - 1, -1, -1):
-            s = 0.0
-            for k in range(i + 1, j + 1):
-                s -= u[i, k] * inverse[k, j]
-            inverse[i, j] = s
-    for i in range(d):
-        for j in range(i + 1):
-            s = 0.0
-            for k in range(j + 1):
-                s += inverse[k, i] * inverse[k, j] / diagonal[k]
-            p[i, j] = s
-            p[j, i] = s
-    return True
-
-
-@bare_as(types.void(f2, f1, i0, w1))
-def solve_ud(u, diagonal, d, b):
-    """b <- (U D Uᵀ)⁻¹ b."""
-    for i in range(d - 1, -1, -1):
-        for k in range(i + 1, d):
-            b[i] -= u[i, k] * b[k]
-    for i in range(d):
-        b[i] /= diagonal[i]
-        for k in range(i):
-            b[i] -= u[k, i] * b[k]
-
-
-@bare_as(b0(w2, w1, f2, f2, f0, f1, i0, i0, w1, w2, w2, w2, w2, w1))
-def inform(u, diagonal, h, noise, weight, residual, m, d, delta, rows, lower, vectors, array, weights):
-    """Add Hᵀ (R/w)⁻¹ H to U D Uᵀ; delta = Y⁻¹ Hᵀ (R/w)⁻¹ residual.  False: R is singular."""
-    white, variance = vectors[0], vectors[1]
-    decorrelate(h, noise, weight, residual, m, d, rows, white, variance, lower)
-    for i in range(d):
-        delta[i] = 0.0
-        weights[i] = diagonal[i]
-        for j in range(d):
-            array[i, j] = u[i, j]
-    for k in range(m):
-        if not variance[k] > 0.0:
-            return False
-        weights[d + k] = 1.0 / variance[k]
-        for i in range(d):
-            array[i, d + k] = rows[k, i]
-            delta[i] += rows[k, i] * white[k] / variance[k]
-    orthogonalise(array, weights, d, d + m, u, diagonal)
-    solve_ud(u, diagonal, d, delta)
-    return True
 
 
 @inlined
@@ -149,22 +72,52 @@ def absorb(model, plan, reading, x, u, diagonal, p, update, work, expected, resi
     """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if it cannot be."""
     s = plan.sensor[reading]
     m, d, blocks = model.z_dim[s], model.d, len(model.table)
-    h, flat, innovation_cov, delta, cross, gain, lower, vectors = update
+    h, flat, innovation_cov, delta, rows, lower, vectors, new, new_diagonal = update
     noise = plan.noise_cov[plan.noise_row[reading]]
     measure(model, plan, reading, x, 0, expected, residual)
     sensor_jacobian(model, plan, reading, x, 0, expected, flat, h)
-    nis, log_det = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
+    multiply(h, p, rows, m, d, d)
+    multiply_nt(rows, h, innovation_cov, m, d, m)
+    for i in range(m):
+        for j in range(m):
+            innovation_cov[i, j] += noise[i, j]
+    symmetrise(innovation_cov, m)
+    nis, log_det = inform(
+        u,
+        diagonal,
+        h,
+        noise,
+        1.0,
+        residual,
+        m,
+        d,
+        delta,
+        new,
+        new_diagonal,
+        rows,
+        lower,
+        vectors,
+        work[6],
+        work[7],
+    )
     verdict = admit(model, plan, reading, nis, residual, innovation_cov, out)
     if verdict < 1:
         return math.nan if verdict < 0 else 0.0
+    log_likelihood = -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
     weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
-    informed = inform(
-        u, diagonal, h, noise, weight, residual, m, d, delta, cross, lower, vectors, work[6], work[7]
-    )
-    if not informed or not covariance(u, diagonal, d, work[8], p):
+    if weight < 1.0:
+        nis, _ = inform(
+            u, diagonal, h, noise, weight, residual, m, d, delta, new, new_diagonal, rows, lower, vectors,
+            work[6], work[7],
+        )  # fmt: skip
+    for i in range(d):
+        diagonal[i] = new_diagonal[1 + i]
+        for j in range(d):
+            u[i, j] = new[1 + i, 1 + j]
+    if not nis >= 0.0 or not covariance(u, diagonal, d, work[8], p):
         return math.nan
     retract(model.table, 0, blocks, x, 0, delta, 0, x, 0)
-    return -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
+    return log_likelihood
 
 
 @bare
@@ -209,13 +162,13 @@ def filter_information(model, plan, prior_mean, prior_cov, keep, out):
     u, diagonal = np.empty((d, d)), np.empty(d)
     work = (
         np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)), np.empty((d, d)), np.empty(d),
-        np.empty((d, d + widest)), np.empty(d + widest), np.empty((d, d)), np.empty(d), np.empty(d),
+        np.empty((d + 1, d + widest)), np.empty(d + widest), np.empty((d, d)), np.empty(d), np.empty(d),
         np.empty(d),
     )  # fmt: skip
     flat = np.empty(scratch_size(n, d, widest))
     update = (
         np.empty((widest, d)), flat, np.empty((widest, widest)), np.empty(d), np.empty((widest, d)),
-        np.empty((widest, d)), np.empty((widest, widest)), np.empty((2, max(widest, d))),
+        np.empty((widest, widest)), np.empty((2, max(widest, d))), np.empty((d + 1, d + 1)), np.empty(d + 1),
     )  # fmt: skip
     # Y = U⁻ᵀ D⁻¹ U⁻¹ of the prior's factors, made triangular the other way round
     factor_ud(prior_cov, d, u, diagonal)

@@ -18,6 +18,7 @@ __all__ = ["carry_columns", "orthogonalise", "push_root", "push_ud", "triangular
 
 PAIR = types.Tuple([f0, f0])
 LOST = 1e-30  # a row whose square falls below this share of what it was depends on the rows below it
+VANISHED = 1e-150  # a standard deviation whose square is about to underflow is zero
 
 
 @bare_as(types.void(w2, f1, i0, i0, w2, w1))
@@ -55,15 +56,24 @@ def orthogonalise(w, weight, d, columns, u, diagonal):
 def triangularise(a, rows, columns):
     """A (rows, columns) <- A Θ, lower triangular with a diagonal that is not negative, for an orthogonal Θ.
 
-    One Householder reflection for each row (Golub and Van Loan 2013, section 5.2); rows <= columns.
+    One Householder reflection for each row, rows <= columns.  The largest entry of a row is brought to its
+    diagonal first, so that columns of very different size keep their digits (Cox and Higham 1998, Stability
+    of Householder QR factorization for weighted least squares problems).
     """
     for j in range(rows):
-        s = 0.0
+        s, best = 0.0, j
         for k in range(j, columns):
             s += a[j, k] * a[j, k]
+            if abs(a[j, k]) > abs(a[j, best]):
+                best = k
         norm = math.sqrt(s)
-        if norm == 0.0:
+        if norm < VANISHED:
+            for k in range(j, columns):
+                a[j, k] = 0.0
             continue
+        if best != j:
+            for i in range(j, rows):
+                a[i, j], a[i, best] = a[i, best], a[i, j]
         first = a[j, j]
         sign = -1.0 if first > 0.0 else 1.0
         a[j, j] = first - sign * norm
