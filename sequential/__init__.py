@@ -14,6 +14,7 @@
 
 from sequential.discretise import van_loan
 from sequential.errors import FactorlabError
+from sequential.filterpy import from_filterpy
 from sequential.filters import (
     ExtendedKalmanFilter,
     InteractingMultipleModel,
@@ -115,6 +116,7 @@ __all__ = [
     "Vector",
     "alpha_beta",
     "diagonal",
+    "from_filterpy",
     "inertial_state",
     "prepare",
     "run",
