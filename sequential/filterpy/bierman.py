@@ -38,7 +38,7 @@ def ud_factor(P: Array, what: str = "P") -> tuple[Array, Array]:
     U, d = np.eye(n), np.zeros(n)
     for j in range(n - 1, -1, -1):
         pivot = left[j, j]
-        if pivot < -INDEFINITE * scale[j]:
+        if pivot < -INDEFINITE * scale[j] - (n * EPS) ** 2 * scale.max():
             lowest = float(np.linalg.eigvalsh(0.5 * (P + P.T)).min())
             msg = f"{what} is not positive semi-definite: smallest eigenvalue {lowest:.3g}; mend it first"
             raise NotPositiveDefiniteError(msg)

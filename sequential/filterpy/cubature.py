@@ -65,7 +65,7 @@ class FilterpyCubature(Recursion):
             innovation[missing], dz[:, missing] = 0.0, 0.0
             R = np.where(missing | missing[:, None], np.diag(missing.astype(float)), R)
         dx = residuals(drawn, np.ravel(self.x), self.residual_x)
-        self.K, self.S, self.SI, self.P = sigma_update(self.P, dx, dz, self._weights(), R)
+        self.K, self.S, self.SI, self.P = sigma_update(self.P, dx, (dz, self.sigmas_h), self._weights(), R)
         self.y = innovation[:, None]
         self.x = self.x + (self.K @ innovation).reshape(self.x.shape)
         self._after_update(z, int(missing.sum()))

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.filterpy.bierman import root, ud_factor
-from sequential.filterpy.linear_update import Update, in_doubt, linear_update
+from sequential.filterpy.bierman import EPS, root, ud_factor
+from sequential.filterpy.linear_update import DOUBT, Update, in_doubt, linear_update
 
-__all__ = ["Moments", "moments", "residuals", "sigma_update", "sturdy_points"]
+__all__ = ["Moments", "moments", "residuals", "settled", "sigma_covariance", "sigma_update", "sturdy_points"]
 
 Array = NDArray[Any]
 Difference = Callable[[Any, Any], Any]
@@ -76,35 +76,88 @@ def moments(
     return Moments(mean, residuals(sigmas, mean, difference))
 
 
-def sigma_update(
-    P: Array, dx: Array, dz: Array, weights: Array, R: Array, inv: Any = np.linalg.inv
-) -> Update:
-    """Update by what sigma points say: residuals dx (k, n) of the state and dz (k, m) of the reading.
+def sigma_covariance(P: Array, dx: Array, df: Array, weights: Array, noise: Array) -> Array:
+    """Covariance of moved or observed points with residuals df (k, m), plus noise.
 
-    The covariance is Σ w (dx - K dz)(dx - K dz)ᵀ + K R Kᵀ, Joseph's form for sigma points.  A negative weight
-    can still spoil it, or S be singular; then the same statistics are read as a linear sensor H = Pxzᵀ P⁻¹
+    Where a negative weight makes it indefinite, it is what a line through the points explains of it, from
+    residuals dx (k, n) of covariance P, plus what is left in the directions where that is positive.
+    """
+    cov = df.T @ (weights[:, None] * df) + noise
+    cov = np.asarray(0.5 * (cov + cov.T))
+    if weights.min() >= 0.0 or is_definite(cov):
+        return cov
+    _, explained, rest = regression(P, dx, df, weights)
+    return explained + rest + noise
+
+
+def sigma_update(
+    P: Array, dx: Array, seen: tuple[Array, Array], weights: Array, R: Array, inv: Any = np.linalg.inv
+) -> Update:
+    """Update by what sigma points say: residuals dx (k, n) of the state, `seen` = (dz (k, m), points (k, m)).
+
+    The covariance is Σ w (dx - K dz)(dx - K dz)ᵀ + K R Kᵀ, Joseph's form for sigma points.  Where a negative
+    weight spoils it, or S is close to singular, the same statistics are read as a linear sensor H = Pxzᵀ P⁻¹
     whose noise is R and whatever of the spread of dz no line explains, and the update is made by UD.
     """
+    dz, points = seen
     weighted = weights[:, None] * dz
     S = dz.T @ weighted + R
+    S = 0.5 * (S + S.T)
     Pxz = dx.T @ weighted
-    plain = inv is np.linalg.inv
-    if not (plain and in_doubt(S, R)):
-        SI = inv(S)
-        K = Pxz @ SI
+    if inv is np.linalg.inv and in_doubt(S, R):
+        # below this, a variance is the rounding of the points themselves
+        floor = (16 * EPS * np.abs(points).max(axis=0)) ** 2 * np.abs(weights).sum()
+        inverse = inverse_above(S, floor)
+    else:
+        inverse = 1.0 / S if len(S) == 1 and inv is np.linalg.inv else inv(S)
+    if inverse is not None:
+        K = Pxz @ inverse
         left = dx - dz @ K.T
-        after = left.T @ (weights[:, None] * left) + K @ R @ K.T
-        after = 0.5 * (after + after.T)
-        if (weights >= 0.0).all() or is_definite(after):
-            return Update(K, S, SI, after)
+        after = settled(left.T @ (weights[:, None] * left) + K @ R @ K.T, P, weights)
+        if after is not None:
+            return Update(K, S, inverse, after)
+    H, _, rest = regression(P, dx, dz, weights)
+    return linear_update(P, H, R + rest)
+
+
+def regression(P: Array, dx: Array, df: Array, weights: Array) -> tuple[Array, Array, Array]:
+    """The line H (m, n) through sigma points, the covariance it explains, and what is left, if positive."""
     U, d = ud_factor(P)
     half = U * np.sqrt(d)
-    H = (np.linalg.pinv(half) @ Pxz).T @ np.linalg.pinv(half)
-    spread = S - R - H @ P @ H.T
-    values, vectors = np.linalg.eigh(0.5 * (spread + spread.T))
-    rounding = len(P) * np.finfo(np.float64).eps * np.abs(weights).max() * np.abs(np.diagonal(S)).max()
+    back = np.linalg.pinv(half)
+    slope = back @ (dx.T @ (weights[:, None] * df))
+    explained = slope.T @ slope
+    rest = df.T @ (weights[:, None] * df) - explained
+    values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
+    rounding = 16 * len(dx) * EPS * np.abs(weights).max() * np.abs(np.diagonal(explained)).max()
     values = np.where(values > rounding, values, 0.0)
-    return linear_update((half @ half.T), H, R + (vectors * values) @ vectors.T)
+    return slope.T @ back, explained, (vectors * values) @ vectors.T
+
+
+def inverse_above(S: Array, floor: Array) -> Array | None:
+    """Inverse of S above a floor (m,) of variances, or None where what lies above is ill-conditioned."""
+    sigma = np.sqrt(np.maximum(np.diagonal(S), 0.0))
+    scale = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=sigma * sigma > floor)
+    values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
+    kept = values > max(len(S) * EPS, float((floor * scale * scale).max()))
+    if (values[kept] < DOUBT).any():
+        return None
+    half = scale[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+    return np.asarray(half @ half.T)
+
+
+def settled(cov: Array, before: Array, weights: Array) -> Array | None:
+    """A covariance made symmetric and without negative rounding; None where it is negative beyond that."""
+    cov = 0.5 * (cov + cov.T)
+    if weights.min() >= 0.0 or is_definite(cov):
+        return cov
+    sigma = np.sqrt(np.maximum(np.diagonal(before), 0.0))
+    scale = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=sigma > 0.0)
+    values, vectors = np.linalg.eigh(cov * np.outer(scale, scale))
+    if values.min() < -16 * len(cov) * EPS * np.abs(weights).sum():
+        return None
+    half = sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(half @ half.T)
 
 
 def is_definite(P: Array) -> bool:

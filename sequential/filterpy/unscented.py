@@ -9,9 +9,18 @@ from numpy.typing import NDArray
 
 from sequential.errors import ShapeError
 from sequential.filterpy.attributes import Covariance, State, as_covariance, as_reading
+from sequential.filterpy.linear_update import joseph
 from sequential.filterpy.passes import smoother_gain
 from sequential.filterpy.recursion import Recursion
-from sequential.filterpy.sigma_points import is_definite, moments, residuals, sigma_update, sturdy_points
+from sequential.filterpy.sigma_points import (
+    moments,
+    regression,
+    residuals,
+    settled,
+    sigma_covariance,
+    sigma_update,
+    sturdy_points,
+)
 
 __all__ = ["FilterpyUnscented"]
 
@@ -65,16 +74,19 @@ class FilterpyUnscented(Recursion):
         if UT is not None:
             self.x, self.P = UT(self.sigmas_f, self.Wm, self.Wc, self.Q, self.x_mean, self.residual_x)
         else:
-            mean, dx = moments(self.sigmas_f, self.Wm, self.x_mean, self.residual_x, self.state_add)
-            self.x, self.P = mean, dx.T @ (self.Wc[:, None] * dx) + self.Q
+            mean, df = moments(self.sigmas_f, self.Wm, self.x_mean, self.residual_x, self.state_add)
+            dx = residuals(self._points, self.x, self.residual_x)
+            self.P = sigma_covariance(self.P, dx, df, self.Wc, self.Q)
+            self.x = mean
         self._redraw()
         self._keep("prior")
 
     def compute_process_sigmas(self, dt: float, fx: Any = None, **fx_args: Any) -> None:
         """Draw sigma points of the belief and move each by fx."""
         fx = self.fx if fx is None else fx
-        drawn = self.points_fn.sigma_points(self.x, self.P)
-        self.sigmas_f = np.array([np.ravel(fx(point, dt, **fx_args)) for point in drawn], dtype=np.float64)
+        self._points = np.asarray(self.points_fn.sigma_points(self.x, self.P), dtype=np.float64)
+        moved = [np.ravel(fx(point, dt, **fx_args)) for point in self._points]
+        self.sigmas_f = np.array(moved, dtype=np.float64)
 
     def _redraw(self) -> None:
         self.sigmas_f = np.asarray(self.points_fn.sigma_points(self.x, self.P), dtype=np.float64)
@@ -111,7 +123,8 @@ class FilterpyUnscented(Recursion):
 
     def _correct(self, dz: Array, R: Array) -> None:
         dx = residuals(self.sigmas_f, self.x, self.residual_x)
-        self.K, self.S, self.SI, self.P = sigma_update(self.P, dx, dz, self.Wc, R, self.inv)
+        seen = dz, self.sigmas_h
+        self.K, self.S, self.SI, self.P = sigma_update(self.P, dx, seen, self.Wc, R, self.inv)
         self.x = self.state_add(self.x, self.K @ self.y)
 
     def cross_variance(self, x: Any, z: Any, sigmas_f: Array, sigmas_h: Array) -> Array:
@@ -166,14 +179,14 @@ class FilterpyUnscented(Recursion):
             df = residuals(moved, ahead, self.residual_x)
         else:
             ahead, df = moments(moved, self.Wm, self.x_mean, self.residual_x, self.state_add)
-            P_ahead = df.T @ (Wc * df) + Q
+            P_ahead = sigma_covariance(P, residuals(drawn, x, self.residual_x), df, self.Wc, Q)
         dx = residuals(drawn, x, self.residual_x)
         K = smoother_gain(dx.T @ (Wc * df), P_ahead, self.inv)
         left = dx - df @ K.T
-        kept = left.T @ (Wc * left) + K @ Q @ K.T
-        if not is_definite(kept):
-            values, vectors = np.linalg.eigh(0.5 * (kept + kept.T))
-            kept = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        kept = settled(left.T @ (Wc * left) + K @ Q @ K.T, P, self.Wc)
+        if kept is None:
+            H, _, rest = regression(P, dx, df, self.Wc)
+            kept = joseph(P, H, rest + Q, K)
         smoothed = kept + K @ after[1] @ K.T
         moved_by = K @ np.ravel(self.residual_x(after[0], ahead))
         return np.ravel(self.state_add(x, moved_by)), 0.5 * (smoothed + smoothed.T), K
