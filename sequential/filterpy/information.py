@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from sequential.errors import SolverError
 from sequential.filterpy.attributes import Control, Covariance, Matrix, State, as_covariance, as_reading
 from sequential.filterpy.linear_update import LOG_2PI, log_density, pseudo_inverse
-from sequential.filterpy.recursion import Recursion, columns, without_missing
+from sequential.filterpy.recursion import columns, without_missing
+from sequential.filterpy.state_space import LinearRecursion
 
 __all__ = ["FilterpyInformation"]
 
 Array = NDArray[Any]
 
 
-class FilterpyInformation(Recursion):
+class FilterpyInformation(LinearRecursion):
     """A linear filter that carries the inverse of P, so that it may begin by knowing nothing: P_inv = 0.
 
     `x` is always a state.  Directions in which P_inv is still singular keep the number that they began with.
@@ -143,12 +144,6 @@ class FilterpyInformation(Recursion):
             return np.asarray(self.inv(self.P_inv))
         except np.linalg.LinAlgError:
             return np.diag(np.full(self.dim_x, np.inf))
-
-    def model(self, dt: float | None = None) -> Any:
-        """The same problem as a `StateSpace`; `dt` is the time of one `predict`, 1 s unless given."""
-        from sequential.filterpy.state_space import as_state_space
-
-        return as_state_space(self, dt)
 
     @property
     def R(self) -> Array:

@@ -14,14 +14,15 @@ from sequential.filterpy.attributes import Control, Covariance, Matrix, State, a
 from sequential.filterpy.dimensions import require_dimensions
 from sequential.filterpy.linear_update import Update, correlated_update, linear_update, log_density
 from sequential.filterpy.passes import filter_pass, smoother_pass
-from sequential.filterpy.recursion import SMALLEST, Recursion, columns, without_missing
+from sequential.filterpy.recursion import SMALLEST, columns, without_missing
+from sequential.filterpy.state_space import LinearRecursion
 
 __all__ = ["FilterpyKalman"]
 
 Array = NDArray[Any]
 
 
-class FilterpyKalman(Recursion):
+class FilterpyKalman(LinearRecursion):
     """A linear filter under FilterPy's names: x, P, F, H, Q, R, B, M in; K, y, S, SI and the beliefs out."""
 
     dim_u: int = 0
@@ -190,12 +191,3 @@ class FilterpyKalman(Recursion):
     ) -> None:
         """Raise `ShapeError` where these matrices, or the filter's own, do not fit together."""
         require_dimensions(self, z, H, R, F, Q)
-
-    def model(self, dt: float | None = None) -> Any:
-        """The same problem as a `StateSpace`, to go on with in any estimator: see `sequential.run`.
-
-        `dt` is the time that one `predict` stands for, in seconds; 1 s unless given.
-        """
-        from sequential.filterpy.state_space import as_state_space
-
-        return as_state_space(self, dt)

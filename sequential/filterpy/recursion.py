@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import ModelError, ShapeError
+from sequential.errors import ShapeError
 from sequential.filterpy.attributes import nothing_read
 from sequential.filterpy.linear_update import LOG_2PI, log_density
 
@@ -48,13 +48,6 @@ class TakenOver:
         """Remember the belief as `x_prior` and `P_prior`, or as `x_post` and `P_post`."""
         setattr(self, f"x_{when}", self.x.copy())
         setattr(self, f"P_{when}", self.P.copy())
-
-    def model(self, dt: float | None = None) -> Any:
-        """The same problem as a `StateSpace`, where the filter is linear; raises `ModelError` elsewhere."""
-        raise ModelError(
-            f"a {type(self).__name__} holds functions of its own calling convention, which no StateSpace "
-            "takes; declare the model with sequential.Process(step=…) and sequential.Sensor(observe=…)"
-        )
 
     def __repr__(self) -> str:
         lines = [f"{type(self).__name__}, taken over from FilterPy"]

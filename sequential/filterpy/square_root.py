@@ -9,20 +9,21 @@ from numpy.typing import NDArray
 
 from sequential.filterpy.attributes import Control, Matrix, State, as_covariance, as_reading
 from sequential.filterpy.bierman import root, ud_update
-from sequential.filterpy.recursion import Recursion, columns, without_missing
+from sequential.filterpy.recursion import columns, without_missing
+from sequential.filterpy.state_space import LinearRecursion
 
 __all__ = ["FilterpySquareRoot"]
 
 Array = NDArray[Any]
 
 
-class FilterpySquareRoot(Recursion):
+class FilterpySquareRoot(LinearRecursion):
     """A linear filter that carries a root of P through QR (Kaminski, Bryson, Schmidt 1971).
 
     `P1_2 @ P1_2.T` is P, and so with Q1_2, R1_2 and S1_2.
     """
 
-    derived: ClassVar[frozenset[str]] = Recursion.derived | {"_P", "_Q", "_R"}
+    derived: ClassVar[frozenset[str]] = LinearRecursion.derived | {"_P", "_Q", "_R"}
     x: Any = State()
     F: Any = Matrix("dim_x", "dim_x")
     H: Any = Matrix("dim_z", "dim_x")
@@ -94,12 +95,6 @@ class FilterpySquareRoot(Recursion):
         """What the sensor would read at x."""
         seen: Array = self.H @ np.asarray(x, dtype=np.float64)
         return seen
-
-    def model(self, dt: float | None = None) -> Any:
-        """The same problem as a `StateSpace`; `dt` is the time of one `predict`, 1 s unless given."""
-        from sequential.filterpy.state_space import as_state_space
-
-        return as_state_space(self, dt)
 
     @property
     def P(self) -> Any:

@@ -53,9 +53,8 @@ def from_filterpy(kf: Any) -> Any:
     Returns
     -------
     object
-        with the same attributes and methods; a linear filter has `model(dt)` as well, the same problem as a
-        `StateSpace` for every estimator here.  Where its numbers differ from FilterPy's is told in
-        `sequential.filterpy`.
+        with the same attributes and methods; where its numbers differ is told in `sequential.filterpy`.  A
+        linear filter has `model(dt)` and `log(zs, dt)` as well: the same problem for every estimator here.
 
     Raises
     ------
