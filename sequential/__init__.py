@@ -20,9 +20,11 @@ from sequential.filters import (
     InteractingMultipleModel,
     IteratedExtendedKalmanFilter,
     KalmanFilter,
+    ParticleFilter,
     UnscentedKalmanFilter,
+    resample,
 )
-from sequential.history import Innovations, ModeHistory, Prediction, Report, Run
+from sequential.history import Innovations, ModeHistory, ParticleHistory, Prediction, Report, Run
 from sequential.log import SensorLog, Stream
 from sequential.manifold import SE2, SE3, SO2, SO3, NavState, Product, Vector
 from sequential.model import Gaussian, Loss, StateSpace
@@ -90,6 +92,8 @@ __all__ = [
     "ModeHistory",
     "MovingMean",
     "NavState",
+    "ParticleFilter",
+    "ParticleHistory",
     "Position",
     "Prediction",
     "Problem",
@@ -119,6 +123,7 @@ __all__ = [
     "from_filterpy",
     "inertial_state",
     "prepare",
+    "resample",
     "run",
     "simulate",
     "steady_state",

@@ -12,7 +12,7 @@ from sequential.errors import DataError
 from sequential.log import nanoseconds
 from sequential.manifold import Manifold, Product
 
-__all__ = ["Innovations", "ModeHistory", "Prediction", "Report", "Run"]
+__all__ = ["Innovations", "ModeHistory", "ParticleHistory", "Prediction", "Report", "Run"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,6 +95,20 @@ class ModeHistory:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ParticleHistory:
+    """How well particles covered the belief, and, where they were kept, the particles themselves."""
+
+    effective: Array  # (N,) effective sample size 1 / Σ w², before resampling
+    states: Array | None = None  # (N, P, n)
+    weights: Array | None = None  # (N, P)
+
+    def __post_init__(self) -> None:
+        for values in (self.effective, self.states, self.weights):
+            if values is not None:
+                values.flags.writeable = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """Estimates at the nodes of a problem.
 
@@ -109,7 +123,8 @@ class Run:
     log_likelihood: float
     report: Report
     predicted: Prediction | None = None
-    modes: ModeHistory | None = None  # of an estimator that interacts between models
+    modes: ModeHistory | None = None  # of an estimator that mixes models
+    particles: ParticleHistory | None = None  # of an estimator that carries particles
 
     def __post_init__(self) -> None:
         for values in (self.t, self.mean, self.cov):

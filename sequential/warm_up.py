@@ -18,7 +18,18 @@ from sequential.errors import ModelError
 __all__ = ["warm_up"]
 
 # Small functions first, since every kernel needs them; then the kernels, the longest to compile first.
-SMALL = ("matrices", "poses", "charts", "belief", "bierman", "orthogonal", "informing", "sensing")
+SMALL = (
+    "matrices",
+    "poses",
+    "charts",
+    "belief",
+    "bierman",
+    "mixing",
+    "orthogonal",
+    "informing",
+    "resampling",
+    "sensing",
+)
 KERNELS = (
     "multiple",
     "extended",
@@ -28,6 +39,7 @@ KERNELS = (
     "information",
     "iterated",
     "linearize",
+    "particles",
     "smoothing",
     "looking",
     "walking",

@@ -3,6 +3,7 @@
 from sequential.filters.extended import ExtendedKalmanFilter, IteratedExtendedKalmanFilter
 from sequential.filters.kalman import KalmanFilter
 from sequential.filters.multiple import InteractingMultipleModel
+from sequential.filters.particle import ParticleFilter, resample
 from sequential.filters.unscented import UnscentedKalmanFilter
 
 __all__ = [
@@ -10,5 +11,7 @@ __all__ = [
     "InteractingMultipleModel",
     "IteratedExtendedKalmanFilter",
     "KalmanFilter",
+    "ParticleFilter",
     "UnscentedKalmanFilter",
+    "resample",
 ]

@@ -31,6 +31,7 @@ INLINED = (
     "kernels/extended.py",
     "kernels/charts.py",
     "kernels/poses.py",
+    "kernels/resampling.py",
     "kernels/sensing.py",
 )
 

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from sequential.errors import ModelError
 from sequential.filters.extended import ExtendedKalmanFilter
 from sequential.filters.multiple import InteractingMultipleModel
+from sequential.filters.particle import ParticleFilter
 from sequential.history import Report, Run
 from sequential.smoothers.leave_one_out import leave_one_out
 from sequential.smoothers.multiple import smooth_multiple
@@ -40,6 +42,11 @@ class RauchTungStriebel:
         """Smooth the whole log."""
         from sequential.kernels.smoothing import smooth_history
 
+        if isinstance(self.filter, ParticleFilter):
+            raise ModelError(
+                "particles keep no Gaussian prediction to smooth backwards from; give RauchTungStriebel an "
+                "ExtendedKalmanFilter or an UnscentedKalmanFilter"
+            )
         if isinstance(self.filter, InteractingMultipleModel):
             return smooth_multiple(self.filter, problem, self.name)
         forward = replace(self.filter, keep=True).solve(problem)
