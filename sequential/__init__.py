@@ -57,7 +57,14 @@ from sequential.simulate import Simulation, simulate
 from sequential.smoothers import FixedLagSmoother, IteratedSmoother, RauchTungStriebel
 from sequential.steady_state import SteadyState, alpha_beta, steady_state
 from sequential.timeline import Problem, prepare
-from sequential.tuning import Knob, Tuning, tune
+from sequential.tuning import (
+    Knob,
+    Tuning,
+    expectation_maximization,
+    noise_from_still,
+    tune,
+    tune_by_nis,
+)
 
 __all__ = [
     "SE2",
@@ -120,8 +127,10 @@ __all__ = [
     "Vector",
     "alpha_beta",
     "diagonal",
+    "expectation_maximization",
     "from_filterpy",
     "inertial_state",
+    "noise_from_still",
     "prepare",
     "resample",
     "run",
@@ -129,5 +138,6 @@ __all__ = [
     "steady_state",
     "tabulated_input",
     "tune",
+    "tune_by_nis",
     "van_loan",
 ]

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from factorlab.compare.accuracy import position_axes, scored_sensor
-from factorlab.compare.scaling import noise_knobs, scaled
 from factorlab.datasets import Dataset, Truth
 from sequential.errors import DataError, MissingStreamError, ModelError
 from sequential.log import SensorLog, Stream
 from sequential.model import StateSpace
 from sequential.readers import read_log, read_tum
+from sequential.tuning import noise_knobs, scaled
 
 __all__ = ["load_model", "own_dataset", "read_truth", "require_log"]
 

@@ -1,7 +1,26 @@
-"""Noise levels from the readings: innovation maximum likelihood over a few knobs of a model."""
+"""Noise levels from the readings: at rest, by the NIS, by maximum likelihood, by expectation-maximisation."""
 
-from sequential.tuning.knobs import Knob, Tuning
+from sequential.tuning.by_nis import tune_by_nis
+from sequential.tuning.em import expectation_maximization
+from sequential.tuning.knobs import Knob
 from sequential.tuning.likelihood import innovation_log_likelihood
+from sequential.tuning.result import Tuning
+from sequential.tuning.scaling import noise_knobs, scaled, scaled_process
+from sequential.tuning.still import noise_from_still
 from sequential.tuning.tune import tune
+from sequential.tuning.verdict import Verdict, judge
 
-__all__ = ["Knob", "Tuning", "innovation_log_likelihood", "tune"]
+__all__ = [
+    "Knob",
+    "Tuning",
+    "Verdict",
+    "expectation_maximization",
+    "innovation_log_likelihood",
+    "judge",
+    "noise_from_still",
+    "noise_knobs",
+    "scaled",
+    "scaled_process",
+    "tune",
+    "tune_by_nis",
+]

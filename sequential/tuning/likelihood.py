@@ -16,6 +16,7 @@ from sequential.model import StateSpace
 from sequential.run import Estimator
 from sequential.timeline import Problem
 from sequential.tuning.knobs import Knob
+from sequential.tuning.robust import robust_distance
 
 __all__ = ["Posterior", "innovation_log_likelihood"]
 
@@ -26,18 +27,24 @@ def innovation_log_likelihood(run: Run, model: StateSpace) -> float:
     """Log probability of all readings, each given those before it (Schweppe 1965).
 
     A reading that a gate rejected counts with the NIS of its gate: rejecting is never cheaper than using,
-    so that noise cannot be made small by throwing readings away.
+    so that noise cannot be made small by throwing readings away.  A reading of a sensor with a loss counts
+    through that loss (`robust_distance`), so that outliers do not raise the noise of all the others.
     """
     total = run.log_likelihood
     for name, seen in run.innovations.items():
-        gate = model.sensors[name].gate
-        if gate is None or seen.accepted.all():
+        sensor = model.sensors[name]
+        if sensor.loss is not None and seen.accepted.any():
+            nis, rows = seen.nis()[seen.accepted], seen.dof()[seen.accepted]
+            for dim in np.unique(rows).tolist():
+                own = nis[rows == dim]
+                total += 0.5 * float(np.sum(own - robust_distance(sensor.loss, own, dim)))
+        if sensor.gate is None or seen.accepted.all():
             continue
         from scipy.special import chdtri
 
         cov, m = seen.cov[~seen.accepted], seen.dof()[~seen.accepted]
         log_det = np.linalg.slogdet(cov)[1]
-        worst = chdtri(m, 1.0 - gate)
+        worst = chdtri(m, 1.0 - sensor.gate)
         total -= 0.5 * float(np.sum(log_det + worst + m * math.log(2.0 * math.pi)))
     return total
 
@@ -67,14 +74,17 @@ class Posterior:
             k.name: float(k.initial * 10.0 ** (k.decades * v)) for k, v in zip(self.knobs, u, strict=True)
         }
 
-    def log_likelihood(self, u: Array) -> float:
-        """Of the innovations; raises what the filter raises."""
+    def run(self, u: Array) -> tuple[Run, StateSpace]:
+        """The filter's run and the model of these values; raises what the filter raises."""
         with unchecked():
             model = self.build(self.values(u))
         require_same_layout(self.problem.model, model)
         self.evaluations += 1
-        run = self.estimator.solve(replace(self.problem, model=model))
-        return innovation_log_likelihood(run, model)
+        return self.estimator.solve(replace(self.problem, model=model)), model
+
+    def log_likelihood(self, u: Array) -> float:
+        """Of the innovations; raises what the filter raises."""
+        return innovation_log_likelihood(*self.run(u))
 
     def __call__(self, u: Array) -> float:
         """Log posterior up to a constant; -inf where the filter fails or the likelihood is not finite."""

@@ -24,6 +24,7 @@ STEP = 0.02  # of differences: far above rounding, far below the curvature of a 
 CLIFF = 1e300  # stands for minus infinity where differences are taken
 SETTLED = 1e-3  # a Newton step that promises less than this is the last one
 POLISHES = 3
+NO_BETTER = "no better values were found than the initial ones"
 LONGEST = 1.0  # a Newton step is trusted over this distance
 
 
@@ -58,24 +59,31 @@ class Summit(NamedTuple):
     message: str
 
 
-def curvature(function: Function, u: Array, step: float = STEP) -> Curvature:
-    """Gradient and Hessian by symmetric differences: 2k + k (k - 1) + 1 calls."""
+def curvature(function: Function, u: Array, step: float | Array = STEP) -> Curvature:
+    """Gradient and Hessian by symmetric differences of one step, or one for each axis.
+
+    Takes 2k + k (k - 1) + 1 calls.
+    """
     k = len(u)
-    axes = step * np.eye(k)
+    steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (k,))
+    axes = np.diag(steps)
     here = function(u)
     ahead = np.array([function(u + e) for e in axes])
     behind = np.array([function(u - e) for e in axes])
-    hessian = np.diag((ahead + behind - 2 * here) / step**2)
+    hessian = np.diag((ahead + behind - 2 * here) / steps**2)
     for i in range(k):
         for j in range(i):
             both = function(u + axes[i] + axes[j]) + function(u - axes[i] - axes[j])
             single = ahead[i] + behind[i] + ahead[j] + behind[j]
-            hessian[i, j] = hessian[j, i] = (both - single + 2 * here) / (2 * step**2)
-    return Curvature((ahead - behind) / (2 * step), hessian)
+            hessian[i, j] = hessian[j, i] = (both - single + 2 * here) / (2 * steps[i] * steps[j])
+    return Curvature((ahead - behind) / (2 * steps), hessian)
 
 
-def climb(function: Function, dim: int, max_evaluations: int) -> Summit:
-    """Maximise a function whose variables are of the order of one, centred on zero."""
+def climb(function: Function, dim: int, max_evaluations: int, step: float | Array = STEP) -> Summit:
+    """Maximise a function whose variables are of the order of one, centred on zero.
+
+    `step` is that of the differences at the end.
+    """
     from scipy.optimize import minimize
 
     start = START if np.isfinite(function(np.full(dim, START))) else 0.0
@@ -86,13 +94,15 @@ def climb(function: Function, dim: int, max_evaluations: int) -> Summit:
     message = "" if found.success else f"the simplex had not settled after {max_evaluations} evaluations"
     at = np.asarray(found.x, dtype=np.float64)
     if function(np.zeros(dim)) > function(at):
-        at, message = np.zeros(dim), "no better values were found than the initial ones"
-    return polish(function, at, converged=bool(found.success), message=message)
+        at, message = np.zeros(dim), NO_BETTER
+    return polish(function, at, step, converged=bool(found.success), message=message)
 
 
-def polish(function: Function, at: Array, *, converged: bool, message: str) -> Summit:
+def polish(
+    function: Function, at: Array, apart: float | Array = STEP, *, converged: bool, message: str
+) -> Summit:
     """Newton steps while they pay, halved until they do."""
-    shape = curvature(function, at)
+    shape, start = curvature(function, at, apart), function(at)
     for _ in range(POLISHES):
         if not shape.is_summit():
             break
@@ -106,7 +116,9 @@ def polish(function: Function, at: Array, *, converged: bool, message: str) -> S
         if function(at + step) <= function(at):
             break
         at = at + step
-        shape = curvature(function, at)
+        shape = curvature(function, at, apart)
+    if message == NO_BETTER and function(at) > start:
+        message = ""  # the simplex stopped short, the Newton steps did not
     if not shape.is_summit():
         reason = (
             "the Hessian at the optimum is not positive definite: some knob is not determined by this log"

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sequential as sq
-from factorlab.compare.scaling import noise_knobs, scaled
 from factorlab.datasets import Dataset, Truth
 from sequential.evaluate import Trajectory
 from sequential.readers import write_log, write_tum
+from sequential.tuning import noise_knobs, scaled
 
 MODEL_FILE = """
     import sequential as sq

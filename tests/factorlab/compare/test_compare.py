@@ -11,10 +11,10 @@ from factorlab.compare import NAMES, UnknownEstimatorError, compare, document, m
 from factorlab.compare.accuracy import errors_of, has_position, scored_sensor
 from factorlab.compare.engine import prepare
 from factorlab.compare.estimators import require_names
-from factorlab.compare.scaling import noise_knobs, scaled
 from factorlab.compare.text import band, cells, figure, headings, headline, terminal
 from factorlab.datasets import load
 from sequential.errors import ModelError, SolverError
+from sequential.tuning import noise_knobs, scaled
 
 
 def test_the_names_are_the_agreed_ones():
