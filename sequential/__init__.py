@@ -51,6 +51,7 @@ from sequential.models import (
     tabulated_input,
 )
 from sequential.noise import ImuNoise, diagonal
+from sequential.online import Arrivals, Belief, Innovation, Online, Replay, arrivals, stream
 from sequential.run import Estimator, run
 from sequential.signal import Complementary, Hampel, LowPass, MovingMean, SlidingMedian
 from sequential.simulate import Simulation, simulate
@@ -71,6 +72,8 @@ __all__ = [
     "SE3",
     "SO2",
     "SO3",
+    "Arrivals",
+    "Belief",
     "Complementary",
     "ConstantAcceleration",
     "ConstantVelocity",
@@ -86,6 +89,7 @@ __all__ = [
     "Hampel",
     "ImuNoise",
     "Independent",
+    "Innovation",
     "Innovations",
     "InteractingMultipleModel",
     "IteratedExtendedKalmanFilter",
@@ -99,6 +103,7 @@ __all__ = [
     "ModeHistory",
     "MovingMean",
     "NavState",
+    "Online",
     "ParticleFilter",
     "ParticleHistory",
     "Position",
@@ -110,6 +115,7 @@ __all__ = [
     "Range",
     "RangeBearing",
     "RauchTungStriebel",
+    "Replay",
     "Report",
     "Run",
     "Sensor",
@@ -126,6 +132,7 @@ __all__ = [
     "UnscentedKalmanFilter",
     "Vector",
     "alpha_beta",
+    "arrivals",
     "diagonal",
     "expectation_maximization",
     "from_filterpy",
@@ -136,6 +143,7 @@ __all__ = [
     "run",
     "simulate",
     "steady_state",
+    "stream",
     "tabulated_input",
     "tune",
     "tune_by_nis",

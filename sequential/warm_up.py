@@ -33,6 +33,7 @@ SMALL = (
 KERNELS = (
     "multiple",
     "extended",
+    "online_extended",
     "unscented",
     "multiple_smoothing",
     "factored",

@@ -30,6 +30,8 @@ INLINED = (
     "kernels/modes.py",
     "kernels/extended.py",
     "kernels/charts.py",
+    "kernels/handles.py",
+    "kernels/slots.py",
     "kernels/poses.py",
     "kernels/resampling.py",
     "kernels/sensing.py",

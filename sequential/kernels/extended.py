@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit, types
 
-from sequential.kernels.arrays import f1, f2
+from sequential.kernels.arrays import f1, f2, w1, w2
 from sequential.kernels.belief import LOG_TWO_PI, add_correction, admit, gain_and_innovation, joseph
 from sequential.kernels.call import allocating, bare, inlined
 from sequential.kernels.charts import retract, transport
@@ -22,6 +22,12 @@ from sequential.kernels.sensing import loss_weight, measure, scratch_size, senso
 
 __all__ = ["filter_log"]
 
+WORKSPACE = types.Tuple(
+    [
+        w1, w1, w2, w2, types.Tuple([w2, w2, w1, w2]),
+        types.Tuple([w2, w1, w2, w2, w2, w2, w2, w1, w1]), w1, w1,
+    ]
+)  # fmt: skip
 CONVERGED = 1e-9  # an iterated update stops when no tangent component moves by more
 
 
@@ -112,16 +118,10 @@ def filter_nodes(model, plan, belief, x, p, phi, iterations, work, update, expec
     return log_likelihood, -1
 
 
-@njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, FILTERED), cache=True, error_model="numpy")
-def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
-    """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite)."""
-    n, d = model.n, model.d
-    widest = plan.z.shape[1]
+@allocating
+def workspace(n, d, widest):
+    """Scratch arrays of `filter_nodes`, of type WORKSPACE."""
     belief = np.empty(n + d * d)
-    x, p = belief[:n], belief[n:].reshape((d, d))
-    copy_vector(prior_mean, x)
-    copy_matrix(prior_cov, p)
-    phi = np.eye(d)
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
     flat = np.empty(scratch_size(n, d, widest))
     update = (
@@ -129,7 +129,16 @@ def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
         np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
         np.empty(d), np.empty(d),
     )  # fmt: skip
-    expected, residual = np.empty(widest), np.empty(widest)
+    x, p = belief[:n], belief[n:].reshape((d, d))
+    return belief, x, p, np.eye(d), work, update, np.empty(widest), np.empty(widest)
+
+
+@njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, FILTERED), cache=True, error_model="numpy")
+def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out):
+    """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite)."""
+    belief, x, p, phi, work, update, expected, residual = workspace(model.n, model.d, plan.z.shape[1])
+    copy_vector(prior_mean, x)
+    copy_matrix(prior_cov, p)
     return filter_nodes(
         model, plan, belief, x, p, phi, iterations, work, update, expected, residual, keep, out
     )

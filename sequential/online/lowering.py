@@ -1,0 +1,137 @@
+"""From a filter and a model to a kernel that can be called once a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.compile import Compiled, compiled
+from sequential.errors import ModelError
+from sequential.filters import ExtendedKalmanFilter, IteratedExtendedKalmanFilter, KalmanFilter
+from sequential.filters.kalman import require_linear
+from sequential.model import StateSpace
+from sequential.online.belief import Layout
+from sequential.timeline import Schedule
+
+__all__ = ["Handle", "handle"]
+
+
+@dataclass(frozen=True, slots=True)
+class Lowered:
+    """What one filter needs to step: its kernel, scratch arrays, settings, and numbers beside the belief."""
+
+    kernel: Any
+    scratch: Any
+    settings: tuple[Any, ...]
+    extra: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Handle:
+    """A kernel with its records in memory: `step(address, …)`.  Keeps the arrays behind the address alive."""
+
+    step: Callable[..., int]
+    address: int
+    layout: Layout
+    whole: Compiled
+    alive: tuple[Any, ...] = field(repr=False)
+
+
+def handle(estimator: Any, model: StateSpace) -> Handle:
+    """Write the records of a filter and a model down, with scratch arrays of their own.
+
+    Raises
+    ------
+    ModelError
+        where the filter has no online form, or does not take the model.
+    """
+    made = lowered(estimator, model)  # first, since a filter may refuse the model
+    from sequential.kernels.handles import words
+    from sequential.kernels.records import Filtered
+
+    whole = compiled(model)
+    plan, slots = one_node(model)
+    n, d, width = whole.tables.n, whole.tables.d, plan.z.shape[1]
+    filtered = Filtered(
+        np.zeros((1, n)), np.zeros((1, d, d)), np.zeros((1, n)), np.zeros((1, d, d)), np.zeros((1, d, d)),
+        np.zeros((1, width)), np.zeros((1, width, width)), np.zeros(1, dtype=np.int64),
+    )  # fmt: skip
+    record = (whole.tables, plan, slots, filtered, made.scratch, *made.settings)
+    memory = words(record)
+    # The compiled function itself: its dispatcher would look up the types of the arguments on every call.
+    (entry,) = made.kernel.overloads.values()
+    layout = Layout(model.manifold, width, made.extra)
+    return Handle(entry.entry_point, memory.ctypes.data, layout, whole, (memory, record))
+
+
+def one_node(model: StateSpace) -> tuple[Schedule, Any]:
+    """A schedule of one node, one step and one reading, and its arrays to write to."""
+    from sequential.kernels.slots import Slots
+
+    sensors = list(model.sensors.values())
+    width = max([s.manifold.dim for s in sensors] + [1])
+    size = max([s.manifold.size for s in sensors] + [1])
+    noise_cov = np.zeros((len(sensors) + 1, width, width))
+    for k, sensor in enumerate(sensors):
+        noise_cov[k, : sensor.manifold.dim, : sensor.manifold.dim] = sensor.noise_cov
+    z = np.zeros((1, size))
+    arrays: dict[str, NDArray[Any]] = {
+        "step_ptr": np.zeros(2, dtype=np.int64),
+        "step_dt": np.zeros(1),
+        "step_input": np.zeros(1, dtype=np.int64),
+        "inputs": np.zeros((1, max(1, model.process_functions.inputs))),
+        "reading_ptr": np.zeros(2, dtype=np.int64),
+        "sensor": np.zeros(1, dtype=np.int64),
+        "z": z,
+        "context": np.zeros((1, max([f.inputs for f in model.sensor_functions.values()] + [1]))),
+        "z_flat": z[0],
+        "noise_cov": noise_cov,
+        "noise_row": np.zeros(1, dtype=np.int64),
+        "rows": np.zeros(1, dtype=np.int64),
+    }
+    sizes = np.array([s.manifold.size for s in sensors], dtype=np.int64)
+    own = {name: arrays[name] for name in Slots._fields if name not in {"z", "z_size"}}
+    return Schedule(**arrays), Slots(**own, z=z[0], z_size=sizes)
+
+
+@singledispatch
+def lowered(estimator: Any, model: StateSpace) -> Lowered:
+    """Lower a filter; registered for every one that has an online form."""
+    name = type(estimator).__name__
+    known = ", ".join(sorted(kind.__name__ for kind in lowered.registry if kind is not object))
+    msg = f"{name} has no online form; take one of {known}, or run({name}(…), model, log) on a whole log"
+    raise ModelError(msg)
+
+
+@lowered.register
+def _(estimator: KalmanFilter, model: StateSpace) -> Lowered:
+    require_linear(model)
+    return extended(model, estimator, 1)
+
+
+@lowered.register
+def _(estimator: ExtendedKalmanFilter, model: StateSpace) -> Lowered:
+    return extended(model, estimator, 1)
+
+
+@lowered.register
+def _(estimator: IteratedExtendedKalmanFilter, model: StateSpace) -> Lowered:
+    return extended(model, estimator, max(estimator.max_iterations, 2))
+
+
+def extended(model: StateSpace, estimator: Any, iterations: int) -> Lowered:
+    """The default form, plain or iterated."""
+    if estimator.form != "joseph":
+        msg = f"form={estimator.form!r} has no online form; use form='joseph', or run(…) on a whole log"
+        raise ModelError(msg)
+    from sequential.kernels.online_extended import extended_step, make_workspace
+
+    plan, _ = one_node(model)
+    return Lowered(
+        extended_step, make_workspace(model.manifold.size, model.manifold.dim, plan.z.shape[1]), (iterations,)
+    )
