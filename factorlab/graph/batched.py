@@ -18,6 +18,7 @@ from factorlab.graph.solve import Solved, certain_move, newton_decrement, readab
 from sequential.compile import compiled
 from sequential.errors import ModelError
 from sequential.model import evaluate
+from sequential.smoothers.leave_one_out import require_noise
 from sequential.timeline import Problem, sealed
 
 __all__ = ["ChainGraph", "static_directions"]
@@ -70,6 +71,7 @@ class ChainGraph:
 
         self.moving, self.static = static_directions(self.problem)
         require_still(self.problem)
+        require_noise(self.problem, "a factor graph cannot weigh them: give them some, or use a filter")
         self.whole = compiled(self.problem.model)
         dims = np.array([s.manifold.dim for s in self.problem.model.sensors.values()] or [0])
         plan, p = self.problem.schedule, len(self.moving)

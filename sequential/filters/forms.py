@@ -60,8 +60,16 @@ def kernel_of(form: str, iterations: int) -> Callable[..., tuple[float, int]]:
 
 
 def require_informed(problem: Problem, form: str, failed: int, filtered: Any) -> None:
-    """Raise `ModelError` where the information form could not move to a node."""
-    if form != "information" or failed >= -1:
+    """Raise `ModelError` where the information form could not move to a node, or take a perfect reading."""
+    if form != "information" or failed == -1:
+        return
+    if failed >= 0:
+        name = list(problem.model.sensors)[problem.schedule.sensor[failed]]
+        noise = problem.schedule.noise_cov[problem.schedule.noise_row[failed]]
+        m = problem.model.sensors[name].manifold.dim
+        if not np.linalg.det(noise[:m, :m]) > 0.0:
+            msg = f"sensor {name!r} reads without noise, which is infinite information; use form='ud'"
+            raise ModelError(msg)
         return
     node = -2 - failed
     if np.isfinite(filtered.mean[node]).all():

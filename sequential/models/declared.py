@@ -77,7 +77,7 @@ class Sensor(SensorModel):
     Parameters
     ----------
     observe : `observe(x)` or `observe(x, context)` -> (m,) what the sensor would read
-    noise_cov : (m, m), (m,) variances, or a number
+    noise_cov : (m, m), (m,) variances, or a number; zero is a perfect reading, for filters only
     jacobian : same arguments -> (m, d); differenced where absent
     manifold : where the reading lives; a plain vector unless given (`SO2()` for a bearing)
     gate : probability, such as 0.999: readings whose NIS exceeds that χ² quantile are rejected
@@ -98,7 +98,9 @@ class Sensor(SensorModel):
         given = np.asarray(self.noise_cov, dtype=np.float64)
         dim = self.manifold.dim if self.manifold is not None else (len(given) if given.ndim else 1)
         object.__setattr__(self, "manifold", vector_or(self.manifold, dim))
-        object.__setattr__(self, "noise_cov", require_covariance(given, dim, "the noise_cov of a sensor"))
+        # a loss weighs whitened residuals, which a perfect reading does not have
+        cov = require_covariance(given, dim, "the noise_cov of a sensor", definite=self.loss is not None)
+        object.__setattr__(self, "noise_cov", cov)
 
     def functions(self, manifold: Manifold) -> Functions:
         """Lowered: see `SensorModel.functions`."""
@@ -109,7 +111,10 @@ class Sensor(SensorModel):
 
 @dataclass(frozen=True, eq=False)
 class LinearSensor(SensorModel):
-    """A sensor that reads `matrix @ x`: matrix (m, n), noise_cov (m, m)."""
+    """A sensor that reads `matrix @ x`: matrix (m, n), noise_cov (m, m).
+
+    A noise_cov of zero, or a singular one, is a perfect reading: filters take it, factor graphs do not.
+    """
 
     matrix: ArrayLike
     noise_cov: ArrayLike  # type: ignore[assignment]
@@ -121,7 +126,8 @@ class LinearSensor(SensorModel):
         matrix = np.atleast_2d(np.asarray(self.matrix, dtype=np.float64))
         object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "manifold", vector_or(None, len(matrix)))
-        cov = require_covariance(self.noise_cov, len(matrix), "the noise_cov of a LinearSensor")
+        whose = "the noise_cov of a LinearSensor"
+        cov = require_covariance(self.noise_cov, len(matrix), whose, definite=self.loss is not None)
         object.__setattr__(self, "noise_cov", cov)
 
     def functions(self, manifold: Manifold) -> Functions:

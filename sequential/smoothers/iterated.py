@@ -11,7 +11,7 @@ from sequential.errors import NotConvergedError
 from sequential.filters.solution import require_finite
 from sequential.history import Report, Run
 from sequential.smoothers.chain import ChainPass
-from sequential.smoothers.leave_one_out import leave_one_out
+from sequential.smoothers.leave_one_out import leave_one_out, require_noise
 from sequential.smoothers.rauch_tung_striebel import RauchTungStriebel
 from sequential.timeline import Problem
 
@@ -40,6 +40,7 @@ class IteratedSmoother:
 
     def solve(self, problem: Problem) -> Run:
         """Smooth the whole log; raises `NotConvergedError` unless `check` is False."""
+        require_noise(problem, "the iterated smoother cannot tell when it has settled: use RauchTungStriebel")
         began = time.perf_counter()
         start = RauchTungStriebel(leave_one_out=False).solve(problem)
         run = self.refine(problem, start.mean)

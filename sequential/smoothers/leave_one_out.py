@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.compile import compiled
+from sequential.errors import ModelError
 from sequential.filters.solution import masked
 from sequential.history import Innovations, Run
 from sequential.model import Loss, SensorModel
 from sequential.timeline import Problem, sealed
 
-__all__ = ["leave_one_out"]
+__all__ = ["leave_one_out", "require_noise"]
 
 Array = NDArray[np.float64]
 
@@ -35,7 +36,13 @@ def leave_one_out(problem: Problem, smoothed: Run, forward: Run | None = None) -
     smoothed : estimates from all readings
     forward : the filter pass that decided about gates and robust weights; without it all were used, and
         weighted by their residuals at the smoothed states
+
+    Raises
+    ------
+    ModelError
+        where a reading has no noise.
     """
+    require_noise(problem, "their leave-one-out innovations are 0/0: ask for none with leave_one_out=False")
     residual, jacobian, node_of = look_back(problem, smoothed.mean)
     found = {}
     for index, (name, sensor) in enumerate(problem.model.sensors.items()):
@@ -60,6 +67,18 @@ def leave_one_out(problem: Problem, smoothed: Run, forward: Run | None = None) -
             "leave-one-out",
         )
     return found
+
+
+def require_noise(problem: Problem, why: str) -> None:
+    """Raise `ModelError` where a reading is perfect, in a direction at least."""
+    plan = problem.schedule
+    for k, (name, sensor) in enumerate(problem.model.sensors.items()):
+        mine, m = np.unique(plan.noise_row[plan.sensor == k]), sensor.manifold.dim
+        try:
+            np.linalg.cholesky(plan.noise_cov[mine, :m, :m])
+        except np.linalg.LinAlgError:
+            msg = f"sensor {name!r} has readings without noise (noise_cov is singular); {why}"
+            raise ModelError(msg) from None
 
 
 def look_back(problem: Problem, trajectory: Array) -> tuple[Array, Array, NDArray[np.int64]]:

@@ -61,7 +61,10 @@ def test_axes_of_very_different_size_are_no_fault(rng):
             lambda: Position([[1, 0, 0], [0, -1, 0], [0, 0, 1]]),
             "the noise_cov of a Position is not positive definite",
         ),
-        (lambda: LinearSensor([[1.0, 0.0]], 0.0), "the noise_cov of a LinearSensor is not positive definite"),
+        (
+            lambda: LinearSensor([[1.0, 0.0]], -1.0),
+            "the noise_cov of a LinearSensor is not positive semi-definite",
+        ),
         (
             lambda: Gaussian([0.0, 0.0], [[1.0, 2.0], [2.0, 1.0]]),
             "the covariance of a Gaussian is not positive",

@@ -9,6 +9,8 @@ from fuzz import fuzz
 from worlds import times
 
 import sequential as sq
+from factorlab.graph.batch import BatchGraph
+from sequential.errors import ModelError
 
 FORMS = ("joseph", "ud", "sqrt", "information")
 FACTORED = ("ud", "sqrt")
@@ -31,14 +33,6 @@ def still(prior, matrix, noise):
 
 def readings(z, dt=1.0):
     return sq.SensorLog({"z": sq.Stream(dt * np.arange(len(z)), z)})
-
-
-def exactly(problem):
-    """The same problem, its readings without any noise: what the door refuses to be told."""
-    silent = np.zeros_like(problem.schedule.noise_cov)
-    silent.flags.writeable = False
-    object.__setattr__(problem, "schedule", problem.schedule._replace(noise_cov=silent))
-    return problem
 
 
 def assert_covariances(run):
@@ -105,8 +99,7 @@ def test_a_nearly_perfect_sensor_for_fifty_thousand_steps(form, rng):
 def test_a_perfect_reading(form, rng):
     """R = 0 leaves H P Hᵀ = 0 and an estimate that repeats the reading, and nothing is raised."""
     root, h = rng.standard_normal((4, 4)), rng.standard_normal((2, 4))
-    problem = exactly(sq.prepare(still(root @ root.T, h, np.eye(2)), readings([[1.0, -2.0]])))
-    run = sq.KalmanFilter(form=form).solve(problem)
+    run = sq.run(sq.KalmanFilter(form=form), still(root @ root.T, h, 0.0), readings([[1.0, -2.0]]))
     assert_covariances(run)
     assert np.abs(h @ run.cov[0] @ h.T).max() < 1e-13 * np.trace(root @ root.T)
     np.testing.assert_allclose(h @ run.mean[0], [1.0, -2.0], atol=1e-12)
@@ -122,8 +115,7 @@ def test_positions_read_perfectly_beside_velocities_that_follow_them(form):
         h[axis, 2 * axis] = 1.0
     prior[0, 2] = prior[2, 0] = -2.5e5
     prior[0, 4] = prior[4, 0] = 1e-8
-    problem = exactly(sq.prepare(still(prior, h, np.eye(3)), readings([[1.0, 2.0, 3.0]])))
-    run = sq.KalmanFilter(form=form).solve(problem)
+    run = sq.run(sq.KalmanFilter(form=form), still(prior, h, 0.0), readings([[1.0, 2.0, 3.0]]))
     truth = exact.update(prior, h, np.zeros((3, 3)), np.array([1.0, 2.0, 3.0]))[0]
     assert_covariances(run)
     np.testing.assert_allclose(run.cov[0], truth, atol=1e-13 * prior.max())
@@ -179,3 +171,38 @@ def test_no_form_yields_on_random_models(request):
     for form in FACTORED:
         assert tally.negative_variance[form] == tally.indefinite[form] == 0, tally
         assert tally.not_positive_definite[form] == 0, tally
+
+
+def test_perfect_readings_in_every_estimator():
+    """What cannot weigh a reading without noise says so; the others repeat it."""
+    model = sq.StateSpace(
+        sq.Vector(2),
+        sq.Gaussian([0.0, 0.0], [1.0, 1.0]),
+        sq.ConstantVelocity(0.1),
+        {"z": sq.LinearSensor([[1.0, 0.0]], 0.0)},
+        start=0.0,
+    )
+    problem = sq.prepare(model, readings(np.sin(0.1 * np.arange(20))[:, None], 0.1))
+    reference = sq.KalmanFilter(form="ud").solve(problem)
+    np.testing.assert_allclose(reference.mean[:, 0], np.sin(0.1 * np.arange(20)), atol=1e-14)
+    np.testing.assert_allclose(reference.cov[:, 0], 0.0, atol=1e-18)
+    for other in (
+        sq.KalmanFilter(),
+        sq.KalmanFilter(form="sqrt"),
+        sq.IteratedExtendedKalmanFilter(form="ud"),
+        sq.UnscentedKalmanFilter(),
+    ):
+        run = other.solve(problem)
+        np.testing.assert_allclose(run.mean, reference.mean, atol=1e-9)
+        np.testing.assert_allclose(run.cov, reference.cov, atol=1e-12)
+        assert run.log_likelihood == pytest.approx(reference.log_likelihood)
+    smoothed = sq.RauchTungStriebel(leave_one_out=False).solve(problem)
+    np.testing.assert_allclose(smoothed.mean[:, 0], reference.mean[:, 0], atol=1e-12)
+    for refusing in (
+        sq.KalmanFilter(form="information"),
+        sq.RauchTungStriebel(),
+        sq.IteratedSmoother(),
+        BatchGraph(),
+    ):
+        with pytest.raises(ModelError, match=r"sensor 'z' .*without noise.*; "):
+            refusing.solve(problem)
