@@ -96,6 +96,10 @@ class Belief:
         """Where the mean lives."""
         return self._layout.manifold
 
+    def at(self, t: int) -> Belief:
+        """The same belief, said to be of another time in int nanoseconds."""
+        return self if t == self._t else Belief(self._numbers, t, self._layout)
+
     def gaussian(self) -> Gaussian:
         """The same belief as the prior of a model."""
         return Gaussian(self.mean, self.cov)

@@ -8,18 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sequential.errors import DataError, TimeOrderError
-from sequential.log import NS, nanoseconds
+from sequential.errors import DataError, FactorlabError
+from sequential.log import nanoseconds
 from sequential.model import Gaussian, StateSpace
 from sequential.online.belief import Belief, Innovation
-from sequential.online.ports import ports_of, require_input, unknown_sensor
-from sequential.online.stepper import NOTHING, OWN_NOISE, REST, Stepper
+from sequential.online.failing import backwards, failure
+from sequential.online.lowering import handle
+from sequential.online.ports import Port, ports_of, require_input, unknown_sensor
 
 __all__ = ["Online"]
 
 Array = NDArray[np.float64]
-INFINITE = math.inf
-contiguous, float64 = np.ascontiguousarray, np.float64  # looked up once, not on every sample
+NS, INFINITE = 1e9, math.inf
+REST = math.nan  # s: no step at all
+NO_SENSOR = -1
+NOTHING, OWN_NOISE = np.zeros(0), np.zeros((0, 0))
+contiguous, empty, float64 = np.ascontiguousarray, np.empty, np.float64  # looked up once, not every sample
 
 
 class Online:
@@ -53,12 +57,16 @@ class Online:
     (100000000, True)
     """
 
-    __slots__ = ("_driven", "_move", "_ports", "_stepper", "_take", "filter", "model")
+    __slots__ = (
+        "_address", "_driven", "_failures", "_kept", "_kernel", "_layout", "_ports", "_size",
+        "filter", "model",
+    )  # fmt: skip
 
     def __init__(self, filter: Any, model: StateSpace) -> None:  # noqa: A002 - the word of the field
         self.filter, self.model = filter, model
-        self._stepper = Stepper(filter, model)
-        self._move, self._take = self._stepper.move, self._stepper.take
+        self._kept = handle(filter, model)
+        self._kernel, self._address, self._layout = self._kept.step, self._kept.address, self._kept.layout
+        self._size, self._failures = self._layout.size, self._kept.whole.failures
         self._ports, self._driven = ports_of(model), model.process_functions.inputs > 0
 
     def start(self, t: float | None = None) -> Belief:
@@ -67,7 +75,7 @@ class Online:
 
     def belief(self, gaussian: Gaussian, t: float) -> Belief:
         """A belief of your own, at a time in float seconds or int nanoseconds."""
-        layout = self._stepper.layout
+        layout = self._layout
         if (gaussian.mean.shape, gaussian.cov.shape) != layout.shapes:
             msg = (
                 f"a belief about {layout.manifold} has a mean of shape {layout.shapes[0]} and a covariance "
@@ -88,10 +96,16 @@ class Online:
         ------
         ShapeError, TimeOrderError, NotFiniteError
         """
-        given = NOTHING if u is None and not self._driven else require_input(self.model, u)
+        driven = NOTHING if u is None and not self._driven else require_input(self.model, u)
         if not 0.0 <= dt < INFINITE:
             raise backwards(dt)
-        return self._move(belief, round(dt * NS), dt, given)
+        layout = self._layout
+        numbers = belief._numbers if belief._layout is layout else self._adopted(belief)
+        out = empty(self._size)
+        code = self._kernel(self._address, dt, NO_SENSOR, numbers, NOTHING, driven, NOTHING, OWN_NOISE, out)
+        if code or self._failures:
+            raise self._failed(code, None, NOTHING, driven, out)
+        return Belief(out, belief._t + round(dt * NS), layout)
 
     def update(
         self,
@@ -113,43 +127,56 @@ class Online:
         ------
         MissingStreamError, ShapeError, DataError, NotFiniteError, NotPositiveDefiniteError
         """
-        port = self._ports.get(name)
-        if port is None:
-            raise unknown_sensor(self.model, name)
-        values = contiguous(z, float64)
-        if values.shape != port.shape:
-            raise port.refuse(z)
-        known = port.known(context) if port.context or context is not None else NOTHING
-        noise = OWN_NOISE if noise_cov is None else port.noise(noise_cov)
-        return self._take(belief, 0, REST, NOTHING, port, values, known, noise)
+        return self.step(belief, None, name, z, None, context, noise_cov)
 
     def step(
         self,
         belief: Belief,
-        dt: float,
+        dt: float | None,
         name: str,
         z: ArrayLike,
         u: ArrayLike | None = None,
         context: ArrayLike | None = None,
         noise_cov: ArrayLike | None = None,
     ) -> tuple[Belief, Innovation]:
-        """`predict` by `dt` seconds, then `update`: the same result in one call of the kernel."""
+        """`predict` by `dt` seconds, then `update`: the same result in one call of the kernel.
+
+        Written out in one piece, since a call in Python costs as much as the update of a small filter.
+        """
         port = self._ports.get(name)
         if port is None:
             raise unknown_sensor(self.model, name)
-        given = NOTHING if u is None and not self._driven else require_input(self.model, u)
-        if not 0.0 <= dt < INFINITE:
+        if dt is None:
+            dt, moved, driven = REST, 0, NOTHING
+        elif 0.0 <= dt < INFINITE:
+            moved = round(dt * NS)
+            driven = NOTHING if u is None and not self._driven else require_input(self.model, u)
+        else:
             raise backwards(dt)
         values = contiguous(z, float64)
         if values.shape != port.shape:
             raise port.refuse(z)
         known = port.known(context) if port.context or context is not None else NOTHING
         noise = OWN_NOISE if noise_cov is None else port.noise(noise_cov)
-        return self._take(belief, round(dt * NS), dt, given, port, values, known, noise)
+        layout = self._layout
+        numbers = belief._numbers if belief._layout is layout else self._adopted(belief)
+        out = empty(self._size)
+        code = self._kernel(self._address, dt, port.index, numbers, values, driven, known, noise, out)
+        if code or self._failures:
+            raise self._failed(code, port, values, driven, out)
+        return Belief(out, belief._t + moved, layout), Innovation(out, port.dim, layout)
 
+    def _adopted(self, belief: Belief) -> Array:
+        """The numbers of a belief that another filter made, in the layout of this one."""
+        theirs, ours = belief._layout, self._layout
+        if theirs == ours:
+            return belief._numbers
+        if theirs.shapes != ours.shapes:
+            msg = f"a belief about {theirs.manifold} was handed to a model on {ours.manifold}"
+            raise DataError(msg)
+        return ours.pack(belief.mean, belief.cov)
 
-def backwards(dt: float) -> TimeOrderError:
-    """The error for a step into the past, or to nowhere."""
-    return TimeOrderError(
-        f"a step lasts zero or more seconds, got dt = {dt}; late readings are for stream(max_delay=…)"
-    )
+    def _failed(self, code: int, port: Port | None, z: Array, u: Array, out: Array) -> FactorlabError:
+        """The error for a step that failed; raises what a model function raised."""
+        self._kept.whole.raise_failures()
+        return failure(code, port, z, u, out[: self._layout.belief])

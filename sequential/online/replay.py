@@ -18,8 +18,8 @@ from sequential.log import LONGEST, NS, nanoseconds
 from sequential.model import StateSpace
 from sequential.online.belief import Belief, Innovation
 from sequential.online.driving import Driving
+from sequential.online.online import Online
 from sequential.online.ports import Port, ports_of, require_input, unknown_sensor
-from sequential.online.stepper import NOTHING, OWN_NOISE, REST, Stepper
 from sequential.online.tally import Summary, Tally
 
 __all__ = ["Estimate", "Replay"]
@@ -48,8 +48,8 @@ class _Event:
     serial: int
     port: Port | None
     z: Array
-    context: Array
-    noise: Array
+    context: Array | None = None
+    noise: Array | None = None
     belief: Belief | None = None
     innovation: Innovation | None = None
 
@@ -90,13 +90,13 @@ class Replay:
         if not max_delay >= 0.0:
             msg = f"max_delay is zero or more seconds, got {max_delay}"
             raise DataError(msg)
-        self._stepper, self._model, self._ports = Stepper(filter, model), model, ports_of(model)
+        self._online, self._model, self._ports = Online(filter, model), model, ports_of(model)
         self._delay = round(min(max_delay, LONGEST) * NS)
         self._driving = None if model.input is None else Driving(model.input, covers, max_gap)
         self._events: list[_Event] = []
         self._fixed = model.start_ns is not None  # else the first event in time is the start
         self._start = 0 if model.start_ns is None else model.start_ns
-        self._root = self._now = self._prior(self._start)
+        self._root = self._now = self._online.start(self._start)
         self._newest: int | None = None
         self._serial = self._began = 0
         self._tally = Tally(max_delay)
@@ -161,24 +161,20 @@ class Replay:
             if not np.isfinite(given).all():
                 msg = f"{name!r} drives the process and is {given} at {t * 1e-9:.6f} s; leave that out"
                 raise NotFiniteError(msg)
-            return _Event(t, INPUT, self._serial, None, given, NOTHING, OWN_NOISE)
+            return _Event(t, INPUT, self._serial, None, given)
         port = self._ports.get(name)
         if port is None:
             raise unknown_sensor(self._model, name)
         z = port.values(values)
         self._tally.missing += bool(np.isnan(z).all())
-        noise = OWN_NOISE if noise_cov is None else port.noise(noise_cov)
+        noise = None if noise_cov is None else port.noise(noise_cov)
         return _Event(t, port.index, self._serial, port, z, port.known(context), noise)
-
-    def _prior(self, t: int) -> Belief:
-        layout, prior = self._stepper.layout, self._model.prior
-        return Belief(layout.pack(prior.mean, prior.cov), t, layout)
 
     def _open(self, t: int) -> None:
         """Place the prior at the first event in time, where the model does not say when it holds."""
         if not self._fixed and (self._newest is None or t < self._start):
             self._start = t
-            self._root = self._prior(t)
+            self._root = self._online.start(t)
             self._replay(0)
 
     def _insert(self, event: _Event) -> None:
@@ -207,19 +203,19 @@ class Replay:
 
     def _after(self, belief: Belief, event: _Event) -> Belief | None:
         """The belief after an event, from the one before it; None where no input is known to lead there."""
-        moved, u = event.t - belief.t, NOTHING
+        moved, u = event.t - belief.t, None
         if moved and self._driving is not None:
             if not len(self._driving):
                 return None
             self._driving.require_no_gap(self._start, event.t)
             u = self._driving.over(belief.t, event.t)
-        dt = moved * 1e-9 if moved else REST
+        dt = moved * 1e-9
         if event.port is None:
-            return self._stepper.move(belief, moved, dt, u) if moved else belief
-        belief, event.innovation = self._stepper.take(
-            belief, moved, dt, u, event.port, event.z, event.context, event.noise
+            return self._online.predict(belief, dt, u).at(event.t) if moved else belief
+        belief, event.innovation = self._online.step(
+            belief, dt if moved else None, event.port.name, event.z, u, event.context, event.noise
         )
-        return belief
+        return belief.at(event.t)
 
     def _forget(self, newest: int) -> None:
         """Drop the events that nothing can change any more."""
