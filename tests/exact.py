@@ -1,5 +1,6 @@
-"""Kalman updates in rational arithmetic: floats are fractions, so these answers hold to the last digit."""
+"""Kalman updates in rational arithmetic, and whole filters in a hundred digits."""
 
+from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import numpy as np
@@ -65,3 +66,30 @@ def update(p, h, noise, residual):
         float(nis),
         determinant(s),
     )
+
+
+def variances(problem, digits=100):
+    """(K, d) filtered variances of a model of LinearProcess and one LinearSensor, readings missing or not."""
+    model, plan = problem.model, problem.schedule
+    sensor = next(iter(model.sensors.values()))
+    with localcontext() as context:
+        context.prec = digits
+        f, q, p = decimals(model.process.F), decimals(model.process.Q), decimals(model.prior.cov)
+        found = []
+        for node in range(len(problem.t)):
+            for _ in range(plan.step_ptr[node], plan.step_ptr[node + 1]):
+                p = f.dot(p).dot(f.T) + q
+            for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
+                there = ~np.isnan(plan.z[reading])
+                h, noise = decimals(sensor.matrix[there]), decimals(sensor.noise_cov[np.ix_(there, there)])
+                cross = h.dot(p)
+                gain = np.array(solve((cross.dot(h.T) + noise).tolist(), cross.tolist()), dtype=object)
+                p = p - cross.T.dot(gain)
+                p = (p + p.T) / 2
+            found.append([float(v) for v in p.diagonal()])
+    return np.array(found)
+
+
+def decimals(values):
+    """An array of decimals, equal to the given floats."""
+    return np.vectorize(lambda v: Decimal(float(v)), otypes=[object])(np.atleast_2d(values))

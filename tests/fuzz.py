@@ -4,7 +4,9 @@
 """
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import count, islice
 
 import numpy as np
 
@@ -20,9 +22,9 @@ VANISHED = 1e-290  # variances below it have too few digits left for a correlati
 
 @dataclass
 class Tally:
-    """Counts by form; `first` holds the seed of the first model of each kind of failure."""
+    """Counts by form of what went wrong; `first` holds the seed of the first of each kind."""
 
-    models: int = 0
+    models: int
     not_positive_definite: Counter = field(default_factory=Counter)
     refused: Counter = field(default_factory=Counter)
     negative_variance: Counter = field(default_factory=Counter)
@@ -97,6 +99,16 @@ def random_problem(seed):
     return sq.prepare(model, sq.SensorLog({"z": sq.Stream(0.1 * np.arange(STEPS), z)}))
 
 
+def problems(seed=0):
+    """Random problems without end, with their seeds; what the door refuses is drawn anew.
+
+    It refuses covariances whose definiteness is below rounding.
+    """
+    for at in count(seed * 1_000_000_000 + 1):
+        with suppress(NotPositiveDefiniteError):
+            yield at, random_problem(at)
+
+
 def judge(tally, form, seed, run):
     """What is wrong with a run."""
     finite = [run.mean, run.cov, run.innovations["z"].cov, np.array(run.log_likelihood)]
@@ -112,19 +124,10 @@ def judge(tally, form, seed, run):
         tally.count("indefinite", form, seed)
 
 
-def fuzz(count, forms=FORMS, seed=0):
-    """Run every form on `count` random models.
-
-    Models that the door refuses, as covariances whose definiteness is below rounding, are drawn anew.
-    """
-    tally, at = Tally(), seed * 1_000_000_000
-    while tally.models < count:
-        at += 1
-        try:
-            problem = random_problem(at)
-        except NotPositiveDefiniteError:
-            continue
-        tally.models += 1
+def fuzz(models, forms=FORMS, seed=0):
+    """Run every form on so many random models."""
+    tally = Tally(models)
+    for at, problem in islice(problems(seed), models):
         for form in forms:
             try:
                 run = sq.KalmanFilter(form=form).solve(problem)

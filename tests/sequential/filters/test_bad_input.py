@@ -21,6 +21,8 @@ EVERY_ESTIMATOR = [
     sq.RauchTungStriebel(),
     sq.RauchTungStriebel(sq.UnscentedKalmanFilter()),
     sq.IteratedSmoother(),
+    *(sq.ExtendedKalmanFilter(form=form) for form in ("ud", "sqrt", "information")),
+    *(sq.IteratedExtendedKalmanFilter(form=form) for form in ("ud", "sqrt")),
 ]
 every_estimator = pytest.mark.parametrize("estimator", EVERY_ESTIMATOR, ids=lambda e: e.name)
 
