@@ -80,7 +80,7 @@ class Settings:
 def compare(**options: Any) -> int:
     """Run several estimators on one log and put them in one table.
 
-    DATASET is kitti, plaza1, plaza2 or mrclam; LOG is a CSV or NPZ file with named streams, together
+    DATASET is kitti, plaza1, plaza2, mrclam or rail; LOG is a CSV or NPZ file with named streams, together
     with --model.  `factorlab info LOG` shows what a log holds.
     """
     return compare_and_show(Settings(**options))

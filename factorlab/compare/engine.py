@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.compare.accuracy import errors_of
-from factorlab.compare.estimators import KINDS, NAMES, require_names
+from factorlab.compare.estimators import EVERY_NAME, KINDS, require_names
 from factorlab.compare.fitting import fit
 from factorlab.compare.honesty import nis_of, normalised_error_of
 from factorlab.compare.table import Comparison, Row
@@ -71,7 +71,8 @@ def compare(
 def _recommended(dataset: Dataset) -> tuple[str, ...]:
     """The dataset's own choice; one pass of iSAM2 gives two rows."""
     chosen = dataset.default_estimators
-    return tuple(name for name in NAMES if name in chosen or (name == "isam2_final" and "isam2" in chosen))
+    wanted = {*chosen, "isam2_final"} if "isam2" in chosen else set(chosen)
+    return tuple(name for name in EVERY_NAME if name in wanted)
 
 
 class _Steps:

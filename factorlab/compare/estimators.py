@@ -28,6 +28,8 @@ class Kind(NamedTuple):
 
 
 KINDS = {
+    "kf": Kind("Kalman filter", online=True),
+    "kf_rts": Kind("Kalman filter + RTS"),
     "ekf": Kind("EKF", online=True),
     "iekf": Kind("iterated EKF", online=True),
     "ukf": Kind("UKF", online=True),
@@ -37,9 +39,9 @@ KINDS = {
     "isam2": Kind("iSAM2, online", online=True, graph=True),
     "isam2_final": Kind("iSAM2, at the end", graph=True),
     "batch": Kind("batch graph", graph=True),
-    "kf": Kind("Kalman filter", online=True),
 }
-NAMES = tuple(name for name in KINDS if name != "kf")
+LINEAR = ("kf", "kf_rts")  # for linear models only
+NAMES = tuple(name for name in KINDS if name not in LINEAR)
 EVERY_NAME = tuple(KINDS)
 
 
@@ -75,6 +77,7 @@ def make(name: str) -> Estimator:
         return UnscentedKalmanFilter()
     recursive: dict[str, Callable[[], Estimator]] = {
         "kf": KalmanFilter,
+        "kf_rts": lambda: RauchTungStriebel(KalmanFilter()),
         "ekf": ExtendedKalmanFilter,
         "iekf": IteratedExtendedKalmanFilter,
         "ekf_rts": RauchTungStriebel,

@@ -16,6 +16,7 @@ from factorlab.datasets.dataset import Dataset, Truth
 from factorlab.datasets.kitti import load_kitti
 from factorlab.datasets.mrclam import load_mrclam
 from factorlab.datasets.plaza import load_plaza
+from factorlab.datasets.rail import load_rail
 from sequential.errors import DataError
 
 __all__ = ["NAMES", "Dataset", "Truth", "load"]
@@ -25,6 +26,7 @@ _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
     "plaza1": lambda _use_every, data, _robot: [load_plaza(1, data)],
     "plaza2": lambda _use_every, data, _robot: [load_plaza(2, data)],
     "mrclam": lambda _use_every, data, robot: load_mrclam(data, robot),
+    "rail": lambda _use_every, data, _robot: [load_rail(data)],
 }
 NAMES = tuple(_LOADERS)
 

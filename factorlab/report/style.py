@@ -36,6 +36,7 @@ __all__ = [
 LINES: dict[str, dict[str, Any]] = {
     "ekf": {"color": "#D55E00", "linestyle": "-", "marker": "o"},
     "kf": {"color": "#D55E00", "linestyle": "--", "marker": "P"},
+    "kf_rts": {"color": "#0072B2", "linestyle": "--", "marker": "d"},
     "iekf": {"color": "#E69F00", "linestyle": "--", "marker": "s"},
     "ukf": {"color": "#CC79A7", "linestyle": "-.", "marker": "^"},
     "ekf_rts": {"color": "#0072B2", "linestyle": "-", "marker": "v"},
