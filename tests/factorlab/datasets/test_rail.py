@@ -141,7 +141,7 @@ def test_laser_and_odometry_ask_for_the_corrections(rail):
 
 
 def test_the_truth_is_late_against_both(rail):
-    """The laser alone, and the odometry alone, fit it far better where it is moved earlier (the odometry by 80 ms)."""
+    """Laser and odometry each fit it far better where it is moved earlier (the odometry best by 80 ms)."""
     laser, truth = rail.log["laser"], rail.truth
     spread, apart = {}, {}
     for late in (-0.065, -0.03, 0.0, 0.03, 0.065):
