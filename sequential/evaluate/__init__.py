@@ -14,6 +14,7 @@ from sequential.evaluate.consistency import (
     summarise,
 )
 from sequential.evaluate.diagnose import Finding, diagnose
+from sequential.evaluate.monte_carlo import MonteCarlo, monte_carlo
 from sequential.evaluate.pose_error import PoseErrors, ape, rpe, statistics
 from sequential.evaluate.trajectory import Trajectory, associate, interpolate
 from sequential.evaluate.whiteness import Whiteness, autocorrelation, whiteness
@@ -26,6 +27,7 @@ __all__ = [
     "Candidate",
     "Consistency",
     "Finding",
+    "MonteCarlo",
     "PoseErrors",
     "Trajectory",
     "Whiteness",
@@ -40,6 +42,7 @@ __all__ = [
     "diagnose",
     "gap_labels",
     "interpolate",
+    "monte_carlo",
     "nees",
     "nis_summary",
     "normalised_error",
