@@ -37,6 +37,7 @@ KERNELS = (
     "unscented",
     "multiple_smoothing",
     "factored",
+    "online_factored",
     "information",
     "iterated",
     "linearize",

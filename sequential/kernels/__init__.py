@@ -29,6 +29,7 @@ INLINED = (
     "kernels/mixing.py",
     "kernels/modes.py",
     "kernels/extended.py",
+    "kernels/factored.py",
     "kernels/charts.py",
     "kernels/handles.py",
     "kernels/slots.py",

@@ -193,24 +193,21 @@ def filter_nodes(
     return log_likelihood, -1
 
 
-@njit(
-    FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, types.int64, FILTERED),
-    cache=True,
-    error_model="numpy",
-)
-def filter_factored(model, plan, prior_mean, prior_cov, form, iterations, keep, out):
-    """Run the filter in form UD or ROOT; returns (log likelihood, code).
-
-    The code is -1, or the reading at which S was singular, or -2 - k where Q was indefinite before node k.
-    """
-    n, d, widest = model.n, model.d, plan.z.shape[1]
-    x, u, diagonal, phi = prior_mean.copy(), np.empty((d, d)), np.empty(d), np.eye(d)
-    factor_ud(prior_cov, d, u, diagonal)
+@bare_as(types.void(i0, f2, i0, w2, w1))
+def open_factors(form, cov, d, u, diagonal):
+    """U D Uᵀ = P of a semi-definite covariance, in a form's own way."""
+    factor_ud(cov, d, u, diagonal)
     if form == ROOT:
         for j in range(d):
             for i in range(d):
                 u[i, j] *= math.sqrt(diagonal[j])
             diagonal[j] = 1.0
+
+
+@allocating
+def follow(model, plan, x, u, diagonal, form, iterations, keep, out):
+    """Run the filter from x, U and D, in place; see `filter_factored`."""
+    n, d, widest = model.n, model.d, plan.z.shape[1]
     work = (
         np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)), np.empty((d, d)), np.empty(d),
         np.empty((d, 2 * d)), np.empty(2 * d),
@@ -222,6 +219,21 @@ def filter_factored(model, plan, prior_mean, prior_cov, form, iterations, keep, 
         np.empty((widest + d, widest + d)),
     )  # fmt: skip
     return filter_nodes(
-        form, model, plan, x, u, diagonal, phi, iterations, work, update, np.empty(widest), np.empty(widest),
-        keep, out,
+        form, model, plan, x, u, diagonal, np.eye(d), iterations, work, update, np.empty(widest),
+        np.empty(widest), keep, out,
     )  # fmt: skip
+
+
+@njit(
+    FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, types.int64, types.int64, FILTERED),
+    cache=True,
+    error_model="numpy",
+)
+def filter_factored(model, plan, prior_mean, prior_cov, form, iterations, keep, out):
+    """Run the filter in form UD or ROOT; returns (log likelihood, code).
+
+    The code is -1, or the reading at which S was singular, or -2 - k where Q was indefinite before node k.
+    """
+    x, u, diagonal = prior_mean.copy(), np.empty((model.d, model.d)), np.empty(model.d)
+    open_factors(form, prior_cov, model.d, u, diagonal)
+    return follow(model, plan, x, u, diagonal, form, iterations, keep, out)

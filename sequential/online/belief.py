@@ -25,9 +25,8 @@ class Layout:
 
     manifold: Manifold
     width: int
+    form: str = "joseph"
     extra: int = 0
-
-    form: str = "covariance"
 
     @property
     def shapes(self) -> tuple[tuple[int], tuple[int, int]]:

@@ -28,6 +28,7 @@ class Lowered:
     kernel: Any
     scratch: Any
     settings: tuple[Any, ...]
+    form: str = "joseph"
     extra: int = 0
 
 
@@ -56,7 +57,7 @@ def handle(estimator: Any, model: StateSpace) -> Handle:
 
     whole = compiled(model)
     plan, slots = one_node(model)
-    n, d, width = whole.tables.n, whole.tables.d, plan.z.shape[1]
+    n, d, width = whole.tables.n, whole.tables.d, widest(model)
     filtered = Filtered(
         np.zeros((1, n)), np.zeros((1, d, d)), np.zeros((1, n)), np.zeros((1, d, d)), np.zeros((1, d, d)),
         np.zeros((1, width)), np.zeros((1, width, width)), np.zeros(1, dtype=np.int64),
@@ -65,8 +66,13 @@ def handle(estimator: Any, model: StateSpace) -> Handle:
     memory = words(record)
     # The compiled function itself: its dispatcher would look up the types of the arguments on every call.
     (entry,) = made.kernel.overloads.values()
-    layout = Layout(model.manifold, width, made.extra)
+    layout = Layout(model.manifold, width, made.form, made.extra)
     return Handle(entry.entry_point, memory.ctypes.data, layout, whole, (memory, record))
+
+
+def widest(model: StateSpace) -> int:
+    """Storage of the widest measurement."""
+    return max([s.manifold.size for s in model.sensors.values()] + [1])
 
 
 def one_node(model: StateSpace) -> tuple[Schedule, Any]:
@@ -74,12 +80,11 @@ def one_node(model: StateSpace) -> tuple[Schedule, Any]:
     from sequential.kernels.slots import Slots
 
     sensors = list(model.sensors.values())
-    width = max([s.manifold.dim for s in sensors] + [1])
-    size = max([s.manifold.size for s in sensors] + [1])
+    width = widest(model)
     noise_cov = np.zeros((len(sensors) + 1, width, width))
     for k, sensor in enumerate(sensors):
         noise_cov[k, : sensor.manifold.dim, : sensor.manifold.dim] = sensor.noise_cov
-    z = np.zeros((1, size))
+    z = np.zeros((1, width))
     arrays: dict[str, NDArray[Any]] = {
         "step_ptr": np.zeros(2, dtype=np.int64),
         "step_dt": np.zeros(1),
@@ -111,27 +116,32 @@ def lowered(estimator: Any, model: StateSpace) -> Lowered:
 @lowered.register
 def _(estimator: KalmanFilter, model: StateSpace) -> Lowered:
     require_linear(model)
-    return extended(model, estimator, 1)
+    return extended(model, estimator.form, 1)
 
 
 @lowered.register
 def _(estimator: ExtendedKalmanFilter, model: StateSpace) -> Lowered:
-    return extended(model, estimator, 1)
+    return extended(model, estimator.form, 1)
 
 
 @lowered.register
 def _(estimator: IteratedExtendedKalmanFilter, model: StateSpace) -> Lowered:
-    return extended(model, estimator, max(estimator.max_iterations, 2))
+    return extended(model, estimator.form, max(estimator.max_iterations, 2))
 
 
-def extended(model: StateSpace, estimator: Any, iterations: int) -> Lowered:
-    """The default form, plain or iterated."""
-    if estimator.form != "joseph":
-        msg = f"form={estimator.form!r} has no online form; use form='joseph', or run(…) on a whole log"
-        raise ModelError(msg)
-    from sequential.kernels.online_extended import extended_step, make_workspace
+def extended(model: StateSpace, form: str, iterations: int) -> Lowered:
+    """A filter that linearises, in one of its forms, plain or iterated."""
+    n, d, width = model.manifold.size, model.manifold.dim, widest(model)
+    if form == "joseph":
+        from sequential.kernels.online_extended import extended_step, make_workspace
 
-    plan, _ = one_node(model)
-    return Lowered(
-        extended_step, make_workspace(model.manifold.size, model.manifold.dim, plan.z.shape[1]), (iterations,)
-    )
+        return Lowered(extended_step, make_workspace(n, d, width), (iterations,))
+    if form in {"ud", "sqrt"}:
+        from sequential.kernels.factored import ROOT, UD
+        from sequential.kernels.online_factored import factored_step
+
+        scratch = (np.zeros(n), np.zeros((d, d)), np.zeros((d, d)), np.zeros(d))
+        settings = (UD if form == "ud" else ROOT, iterations)
+        return Lowered(factored_step, scratch, settings, form, d * d + d)
+    msg = f"form={form!r} has no online form; use form='joseph' or 'ud', or run(…) on a whole log"
+    raise ModelError(msg)

@@ -9,7 +9,13 @@ import worlds
 
 import sequential as sq
 
-FILTERS = [sq.ExtendedKalmanFilter(), sq.IteratedExtendedKalmanFilter()]
+FILTERS = [
+    sq.ExtendedKalmanFilter(),
+    sq.IteratedExtendedKalmanFilter(),
+    sq.ExtendedKalmanFilter(form="ud"),
+    sq.ExtendedKalmanFilter(form="sqrt"),
+    sq.IteratedExtendedKalmanFilter(form="ud"),
+]
 every_filter = pytest.mark.parametrize("estimator", FILTERS, ids=lambda e: e.name)
 every_world = pytest.mark.parametrize("world", worlds.EVERY_WORLD, ids=repr)
 
