@@ -43,6 +43,7 @@ KERNELS = (
     "linearize",
     "particles",
     "smoothing",
+    "scripted",
     "looking",
     "walking",
 )

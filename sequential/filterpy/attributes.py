@@ -32,7 +32,7 @@ class State:
         if given.shape not in {(n,), (n, 1)}:
             msg = f"{self.name} has shape {given.shape}; a state of {n} numbers is ({n},) or ({n}, 1)"
             raise ShapeError(msg)
-        filter_.__dict__[self.name] = given
+        filter_.__dict__[self.name] = np.ascontiguousarray(given)
 
 
 class Covariance:
@@ -72,7 +72,7 @@ class Matrix:
                     f"it is ({n}, {m})"
                 )
             raise ShapeError(msg)
-        filter_.__dict__[self.name] = given
+        filter_.__dict__[self.name] = np.ascontiguousarray(given)
 
 
 class Control:
@@ -102,7 +102,7 @@ def as_covariance(value: ArrayLike, dim: int, name: str) -> Array:
     if given.shape != (dim, dim):
         msg = f"{name} has shape {given.shape}; it is ({dim}, {dim}), a diagonal ({dim},) or one number"
         raise ShapeError(msg)
-    return given
+    return np.ascontiguousarray(given)
 
 
 def as_reading(z: Any, dim: int, ndim: int) -> Array:

@@ -11,7 +11,7 @@ from sequential.filterpy.attributes import Covariance, State, as_covariance, as_
 from sequential.filterpy.bierman import root
 from sequential.filterpy.extended import as_tuple
 from sequential.filterpy.recursion import Recursion
-from sequential.filterpy.sigma_points import moments, residuals, sigma_update
+from sequential.filterpy.sigma_points import moments, residuals, sigma_update, through
 
 __all__ = ["FilterpyCubature"]
 
@@ -43,8 +43,7 @@ class FilterpyCubature(Recursion):
     def predict(self, dt: float | None = None, fx_args: Any = ()) -> None:
         """One step ahead of `dt` seconds through `fx(x, dt, *fx_args)`; x becomes a column, as there."""
         dt = self._dt if dt is None else dt
-        moved = [np.ravel(self.fx(point, dt, *as_tuple(fx_args))) for point in self._draw()]
-        self.sigmas_f = np.array(moved, dtype=np.float64)
+        self.sigmas_f = through(lambda point: self.fx(point, dt, *as_tuple(fx_args)), self._draw())
         mean, dx = moments(self.sigmas_f, self._weights(), self.x_mean, self.residual_x)
         self.x, self.P = mean[:, None], dx.T @ dx / len(dx) + self.Q
         self._keep("prior")
@@ -57,8 +56,7 @@ class FilterpyCubature(Recursion):
             return
         R = self.R if R is None else as_covariance(R, self.dim_z, "R")
         drawn = self._draw()
-        seen = [np.ravel(self.hx(point, *as_tuple(hx_args))) for point in drawn]
-        self.sigmas_h = np.array(seen, dtype=np.float64)
+        self.sigmas_h = through(lambda point: self.hx(point, *as_tuple(hx_args)), drawn)
         zp, dz = moments(self.sigmas_h, self._weights(), self.z_mean, self.residual_z)
         innovation = as_reading(self.residual_z(as_reading(z, self.dim_z, 1), zp), self.dim_z, 1)
         if missing.any():

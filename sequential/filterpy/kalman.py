@@ -16,6 +16,7 @@ from sequential.filterpy.linear_update import Update, correlated_update, linear_
 from sequential.filterpy.passes import filter_pass, smoother_pass
 from sequential.filterpy.recursion import SMALLEST, columns, without_missing
 from sequential.filterpy.state_space import LinearRecursion
+from sequential.kernels.scripted import predict_step, update_step
 
 __all__ = ["FilterpyKalman"]
 
@@ -38,6 +39,10 @@ class FilterpyKalman(LinearRecursion):
     K: Any
     _alpha_sq: float
 
+    def __init__(self, original: Any) -> None:
+        super().__init__(original)
+        self._still = np.zeros(self.dim_x)
+
     @property
     def _I(self) -> Array:
         return np.eye(self.dim_x)
@@ -55,17 +60,21 @@ class FilterpyKalman(LinearRecursion):
 
     def predict(self, u: Any = None, B: Any = None, F: Any = None, Q: Any = None) -> None:
         """One step ahead; matrices given here serve this step only."""
-        self.x, self.P = self.get_prediction(u, B, F, Q)
-        self._keep("prior")
+        own = self.__dict__
+        own["x"], own["P"] = x, P = self.get_prediction(u, B, F, Q)
+        own["x_prior"], own["P_prior"] = x.copy(), P.copy()
 
     def get_prediction(
         self, u: Any = None, B: Any = None, F: Any = None, Q: Any = None
     ) -> tuple[Array, Array]:
         """State and covariance one step ahead, the filter left as it is."""
-        F = self.F if F is None else np.asarray(F, dtype=np.float64)
+        F = self.F if F is None else np.ascontiguousarray(F, dtype=np.float64)
         Q = self.Q if Q is None else as_covariance(Q, self.dim_x, "Q")
-        P = self._alpha_sq * (F @ self.P @ F.T) + Q
-        return F @ self.x + columns(self.B if B is None else B, u, self.x), P
+        push = columns(self.B if B is None else B, u, self.x)
+        still = self._still if isinstance(push, float) else push.reshape(-1)
+        x, P = np.empty_like(self.x), np.empty_like(self.P)
+        predict_step(F, self.P, Q, self.x.reshape(-1), still, self._alpha_sq, x.reshape(-1), P)
+        return x, P
 
     def update(self, z: Any, R: Any = None, H: Any = None) -> None:
         """Take in a reading: None is no reading, NaN in a component is no reading of that component."""
@@ -77,6 +86,8 @@ class FilterpyKalman(LinearRecursion):
 
     def _take(self, z: Any, R: Any, H: Any, M: Any = None) -> None:
         reshaped = H is None
+        if M is None and self.inv is np.linalg.inv and self._take_compiled(z, R, H):
+            return
         if not (seen := self._look(z, R, H)):
             self._after_update()
             return
@@ -86,6 +97,27 @@ class FilterpyKalman(LinearRecursion):
         self.K, self.S, self.SI, self.P = self._judge(H, R, M)
         self.x = self.x + self.K @ self.y
         self._after_update(reading if reshaped else z, int(missing.sum()))
+
+    def _take_compiled(self, z: Any, R: Any, H: Any) -> bool:
+        """Update in compiled code; False, and nothing done, where the reading is not whole or in doubt."""
+        if z is None:
+            return False
+        rows = self.H if H is None else np.ascontiguousarray(np.atleast_2d(H), dtype=np.float64)
+        m = len(rows)
+        reading = as_reading(z, m, self.x.ndim)
+        noise = self.R if R is None else as_covariance(R, m, "R")
+        y, S, SI, K = np.empty(reading.shape), np.empty((m, m)), np.empty((m, m)), np.empty((self.dim_x, m))
+        x, P = np.empty_like(self.x), np.empty_like(self.P)
+        flat = self.x.reshape(-1), reading.reshape(-1), y.reshape(-1)
+        if update_step(self.P, rows, noise, *flat, S, SI, K, x.reshape(-1), P):
+            return False
+        own = self.__dict__
+        own["y"], own["S"], own["SI"], own["K"], own["x"], own["P"] = y, S, SI, K, x, P
+        own["z"], own["x_post"], own["P_post"] = reading.copy(), x.copy(), P.copy()
+        if H is not None:
+            own["z"] = copy.deepcopy(z)
+        self._missing, self._log_likelihood = 0, None
+        return True
 
     def _judge(self, H: Array, R: Array, M: Any = None) -> Update:
         if M is None:
@@ -165,10 +197,9 @@ class FilterpyKalman(LinearRecursion):
         -------
         states, covariances, gains, and covariances predicted from the node before
         """
-        count = len(Xs)
-        Fs = [self.F] * count if Fs is None else Fs
-        Qs = [self.Q] * count if Qs is None else [as_covariance(Q, self.dim_x, "Q") for Q in Qs]
-        return smoother_pass(Xs, Ps, Fs, Qs, inv)
+        own_Fs = self.F[None] if Fs is None else np.array([np.asarray(F, dtype=np.float64) for F in Fs])
+        own_Qs = self.Q[None] if Qs is None else np.array([as_covariance(Q, self.dim_x, "Qs") for Q in Qs])
+        return smoother_pass(Xs, Ps, own_Fs, own_Qs, inv)
 
     def residual_of(self, z: Any) -> Array:
         """Reading minus what the prediction expected."""

@@ -46,8 +46,8 @@ class TakenOver:
 
     def _keep(self, when: str) -> None:
         """Remember the belief as `x_prior` and `P_prior`, or as `x_post` and `P_post`."""
-        setattr(self, f"x_{when}", self.x.copy())
-        setattr(self, f"P_{when}", self.P.copy())
+        own = self.__dict__
+        own[f"x_{when}"], own[f"P_{when}"] = self.x.copy(), self.P.copy()
 
     def __repr__(self) -> str:
         lines = [f"{type(self).__name__}, taken over from FilterPy"]

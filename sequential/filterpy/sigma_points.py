@@ -31,7 +31,8 @@ def sturdy_points(points: Any) -> Any:
     if getattr(points, "sqrt", None) is None:
         return points
     own = copy.copy(points)
-    own.sqrt = partial(sturdy_root, points.sqrt)
+    usual = getattr(points.sqrt, "__name__", "") == "cholesky" and "scipy" in points.sqrt.__module__
+    own.sqrt = root if usual else partial(sturdy_root, points.sqrt)
     return own
 
 
@@ -44,6 +45,11 @@ def sturdy_root(given: Callable[[Any], Any], P: Array) -> Array:
     except (np.linalg.LinAlgError, ValueError):
         pass
     return root(P)
+
+
+def through(function: Callable[[Any], Any], points: Array) -> Array:
+    """(k, m) what the script's function makes of each point, scalars and columns flattened."""
+    return np.array([function(point) for point in points], dtype=np.float64).reshape(len(points), -1)
 
 
 def residuals(sigmas: Array, mean: Any, difference: Difference) -> Array:

@@ -7,27 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from sequential.errors import ModelError
-from sequential.filterpy.cubature import FilterpyCubature
-from sequential.filterpy.extended import FilterpyExtended
-from sequential.filterpy.fixed_lag import FilterpyFixedLag
-from sequential.filterpy.information import FilterpyInformation
-from sequential.filterpy.kalman import FilterpyKalman
-from sequential.filterpy.mixing import FilterpyMixing
-from sequential.filterpy.recursion import TakenOver
-from sequential.filterpy.square_root import FilterpySquareRoot
-from sequential.filterpy.unscented import FilterpyUnscented
 
 __all__ = ["from_filterpy"]
-
-TAKEN: dict[str, type[TakenOver]] = {
-    "KalmanFilter": FilterpyKalman,
-    "SquareRootKalmanFilter": FilterpySquareRoot,
-    "InformationFilter": FilterpyInformation,
-    "ExtendedKalmanFilter": FilterpyExtended,
-    "UnscentedKalmanFilter": FilterpyUnscented,
-    "CubatureKalmanFilter": FilterpyCubature,
-    "FixedLagSmoother": FilterpyFixedLag,
-}
 
 INSTEAD = {
     "MMAEFilterBank": "an IMMEstimator whose matrix M is the identity weighs a fixed set of filters",
@@ -39,6 +20,29 @@ INSTEAD = {
     "GHFilter": "take a KalmanFilter and its predict_steadystate and update_steadystate",
     "GHKFilter": "take a KalmanFilter and its predict_steadystate and update_steadystate",
 }
+
+
+def taken_over() -> dict[str, type[Any]]:
+    """What takes over which class of FilterPy; brings in compiled code, so it waits until it is asked for."""
+    from sequential.filterpy.cubature import FilterpyCubature
+    from sequential.filterpy.extended import FilterpyExtended
+    from sequential.filterpy.fixed_lag import FilterpyFixedLag
+    from sequential.filterpy.information import FilterpyInformation
+    from sequential.filterpy.kalman import FilterpyKalman
+    from sequential.filterpy.mixing import FilterpyMixing
+    from sequential.filterpy.square_root import FilterpySquareRoot
+    from sequential.filterpy.unscented import FilterpyUnscented
+
+    return {
+        "KalmanFilter": FilterpyKalman,
+        "SquareRootKalmanFilter": FilterpySquareRoot,
+        "InformationFilter": FilterpyInformation,
+        "ExtendedKalmanFilter": FilterpyExtended,
+        "UnscentedKalmanFilter": FilterpyUnscented,
+        "CubatureKalmanFilter": FilterpyCubature,
+        "FixedLagSmoother": FilterpyFixedLag,
+        "IMMEstimator": FilterpyMixing,
+    }
 
 
 def from_filterpy(kf: Any) -> Any:
@@ -67,19 +71,21 @@ def from_filterpy(kf: Any) -> Any:
     >>> kf = KalmanFilter(dim_x=2, dim_z=1)  # doctest: +SKIP
     >>> kf = sequential.from_filterpy(kf)  # doctest: +SKIP
     """
+    from sequential.filterpy.recursion import TakenOver
+
     if isinstance(kf, TakenOver):
         return kf
     lineage = type(kf).__mro__
     home = next((i for i, cls in enumerate(lineage) if is_filterpy(cls)), None)
     if home is None:
         raise ModelError(f"from_filterpy takes a filter of FilterPy, got a {type(kf).__name__}")
-    name = lineage[home].__name__
+    name, taken = lineage[home].__name__, taken_over()
     if name == "IMMEstimator":
-        return FilterpyMixing(kf, [from_filterpy(f) for f in kf.filters])
-    if name not in TAKEN:
-        hint = INSTEAD.get(name, f"from_filterpy takes {', '.join([*TAKEN, 'IMMEstimator'])}")
+        return taken[name](kf, [from_filterpy(f) for f in kf.filters])
+    if name not in taken:
+        hint = INSTEAD.get(name, f"from_filterpy takes {', '.join(taken)}")
         raise ModelError(f"a {name} of FilterPy is not taken over: {hint}")
-    return with_methods_of(lineage[:home], TAKEN[name])(kf)
+    return with_methods_of(lineage[:home], taken[name])(kf)
 
 
 def is_filterpy(cls: type) -> bool:
@@ -87,7 +93,7 @@ def is_filterpy(cls: type) -> bool:
     return cls.__module__.partition(".")[0] in {"filterpy", "bayesian_filters"}
 
 
-def with_methods_of(lineage: tuple[type, ...], taken: type[TakenOver]) -> Callable[[Any], Any]:
+def with_methods_of(lineage: tuple[type, ...], taken: type[Any]) -> Callable[[Any], Any]:
     """`taken` with what classes derived from FilterPy's define themselves, nearest first."""
     own: dict[str, Any] = {}
     for cls in reversed(lineage):

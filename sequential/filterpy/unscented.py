@@ -20,6 +20,7 @@ from sequential.filterpy.sigma_points import (
     sigma_covariance,
     sigma_update,
     sturdy_points,
+    through,
 )
 
 __all__ = ["FilterpyUnscented"]
@@ -85,8 +86,7 @@ class FilterpyUnscented(Recursion):
         """Draw sigma points of the belief and move each by fx."""
         fx = self.fx if fx is None else fx
         self._points = np.asarray(self.points_fn.sigma_points(self.x, self.P), dtype=np.float64)
-        moved = [np.ravel(fx(point, dt, **fx_args)) for point in self._points]
-        self.sigmas_f = np.array(moved, dtype=np.float64)
+        self.sigmas_f = through(lambda point: fx(point, dt, **fx_args), self._points)
 
     def _redraw(self) -> None:
         self.sigmas_f = np.asarray(self.points_fn.sigma_points(self.x, self.P), dtype=np.float64)
@@ -105,7 +105,7 @@ class FilterpyUnscented(Recursion):
         if self._is_stale():
             self._redraw()
         hx = self.hx if hx is None else hx
-        self.sigmas_h = np.array([np.ravel(hx(point, **hx_args)) for point in self.sigmas_f], np.float64)
+        self.sigmas_h = through(lambda point: hx(point, **hx_args), self.sigmas_f)
         m = self.sigmas_h.shape[1]
         R = self.R if R is None else as_covariance(R, m, "R")
         given = as_reading(z, m, 1)
@@ -173,7 +173,7 @@ class FilterpyUnscented(Recursion):
         """One step back: P - K P_ahead Kᵀ as a sum over sigma points, where the weights leave it definite."""
         (x, P), Wc = filtered, self.Wc[:, None]
         drawn = self.points_fn.sigma_points(x, P)
-        moved = np.array([np.ravel(self.fx(point, dt)) for point in drawn], dtype=np.float64)
+        moved = through(lambda point: self.fx(point, dt), drawn)
         if UT is not None:
             ahead, P_ahead = UT(moved, self.Wm, self.Wc, Q, self.x_mean, self.residual_x)
             df = residuals(moved, ahead, self.residual_x)
