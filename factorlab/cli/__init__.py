@@ -9,6 +9,7 @@ from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
 from factorlab.cli.info import info
+from factorlab.cli.tune import tune
 
 __all__ = ["main"]
 
@@ -38,5 +39,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, info, doctor):
+for command in (demo, compare, tune, info, doctor):
     main.add_command(command)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import CHECK_FAILED, DATA_ERROR, in_one_sentence
-from factorlab.cli.settings import as_json, config_option, print_json, seed_option
+from factorlab.cli.settings import as_json, command_line, config_option, print_json, seed_option
 
 if TYPE_CHECKING:
     from factorlab.compare import Comparison
     from factorlab.datasets import Dataset
 
-__all__ = ["Settings", "compare", "compare_and_show"]
+__all__ = ["Settings", "coloured", "compare", "compare_and_show"]
 
 FOLDER = click.Path(file_okay=True, path_type=Path)
 
@@ -112,7 +112,7 @@ def compare_and_show(settings: Settings) -> int:
     done = tuple(comparisons)
     if all(comparison.all_failed for comparison in done):
         return _say_why(done)
-    whole = document(done, _command())
+    whole = document(done, command_line())
     _print(done, whole, as_json=settings.as_json)
     if settings.out is not None:
         from factorlab.report import write_report
@@ -172,24 +172,18 @@ def _print(comparisons: tuple[Comparison, ...], whole: dict[str, Any], *, as_jso
 
     for comparison in comparisons:
         for line in terminal(comparison):
-            click.echo(_coloured(line))
+            click.echo(coloured(line))
         click.echo()
 
 
-def _coloured(line: str) -> str:
+def coloured(line: str) -> str:
+    """A line with its status in colour, unless NO_COLOR is set."""
     colours = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
     import os
 
     if line[:4] in colours and "NO_COLOR" not in os.environ:
         return click.style(line[:4], fg=colours[line[:4]], bold=True) + line[4:]
     return line
-
-
-def _command() -> str:
-    """The command line, as it can be typed again."""
-    import shlex
-
-    return shlex.join(["factorlab", *sys.argv[1:]])
 
 
 def _say_why(comparisons: tuple[Comparison, ...]) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-__all__ = ["Command", "as_json", "config_option", "print_json", "seed_option"]
+__all__ = ["Command", "as_json", "command_line", "config_option", "print_json", "seed_option"]
 
 Command = Callable[..., Any]
 
@@ -44,12 +44,14 @@ def _read(context: click.Context, parameter: click.Parameter, path: Path | None)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise click.BadParameter(f"{path} is not TOML: {error}") from error
     known = _known(context.command)
+    several = {p.name for p in context.command.params if getattr(p, "multiple", False)}
     values = {}
     for key, value in given.items():
         name = known.get(key.replace("-", "_"))
         if name is None:
             raise click.BadParameter(f"{path}: unknown key {key!r}{did_you_mean(key, known)}")
-        values[name] = ",".join(map(str, value)) if isinstance(value, list) else value
+        row = [str(one) for one in (value if isinstance(value, list) else [value])]
+        values[name] = row if name in several else ",".join(row) if isinstance(value, list) else value
     context.default_map = {**(context.default_map or {}), **values}
 
 
@@ -69,6 +71,14 @@ def did_you_mean(key: str, known: Any) -> str:
     """`; did you mean …?`, or the whole list where nothing is near."""
     near = get_close_matches(key, list(known), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(known))}"
+
+
+def command_line() -> str:
+    """The command line, as it can be typed again."""
+    import shlex
+    import sys
+
+    return shlex.join(["factorlab", *sys.argv[1:]])
 
 
 def print_json(document: Any) -> None:

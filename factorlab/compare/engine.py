@@ -11,7 +11,7 @@ from factorlab.compare.accuracy import errors_of
 from factorlab.compare.estimators import EVERY_NAME, KINDS, require_names
 from factorlab.compare.fitting import fit
 from factorlab.compare.honesty import nis_of, normalised_error_of
-from factorlab.compare.table import Comparison, Row
+from factorlab.compare.table import Comparison, Row, Tuned
 from factorlab.compare.timing import solve
 from factorlab.compare.verdict import findings_of
 from factorlab.datasets import Dataset
@@ -37,6 +37,7 @@ def compare(
     seed: int = 0,
     max_gap: float | None = None,
     progress: Progress = silent,
+    fitted: tuple[Tuned, StateSpace] | None = None,
 ) -> Comparison:
     """Run estimators side by side on one recording.
 
@@ -47,6 +48,7 @@ def compare(
     seed : of the resampling behind the bootstrap bands
     max_gap : longest pause of the input stream that is bridged, s
     progress : called with what is being done, how much is done, and out of how much
+    fitted : noise that was fitted already, in place of `tune`
 
     Raises
     ------
@@ -54,13 +56,14 @@ def compare(
         where the log or the model is at fault; a solver that fails becomes a row with its message.
     """
     names = require_names(tuple(estimators) if estimators else _recommended(dataset))
+    tune = tune or fitted is not None
     step = _Steps(progress, len(names) * (2 if tune else 1) + tune + 1)
     untuned: tuple[Row, ...] = ()
     tuned, model = None, dataset.model
     if tune:
         untuned = _rows(names, dataset, _problem(dataset, model, max_gap), seed, step, ", as shipped")
         step("tuning the noise")
-        tuned, model = fit(dataset)
+        tuned, model = fitted or fit(dataset)
     problem = _problem(dataset, model, max_gap)
     rows = _rows(names, dataset, problem, seed, step, ", tuned" if tune else "")
     step("diagnosis")

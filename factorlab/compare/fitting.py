@@ -8,8 +8,9 @@ from factorlab.compare.table import Tuned
 from factorlab.datasets import Dataset
 from sequential.errors import ModelError
 from sequential.model import StateSpace
+from sequential.tuning import Tuning
 
-__all__ = ["fit"]
+__all__ = ["fit", "tuned_of"]
 
 
 def fit(dataset: Dataset) -> tuple[Tuned, StateSpace]:
@@ -26,15 +27,20 @@ def fit(dataset: Dataset) -> tuple[Tuned, StateSpace]:
         msg = f"there is nothing to tune in {dataset.name!r}: its model has no noise that can be scaled"
         raise ModelError(msg)
     found = tune(dataset.build, dataset.knobs, dataset.log)
-    tuned = Tuned(
+    return tuned_of(found), dataset.build(found.values)
+
+
+def tuned_of(found: Tuning) -> Tuned:
+    """The lines of a table about a tuning, whatever its method."""
+    intervals = {name: found.interval(name) for name in found.values}
+    return Tuned(
         initial=dict(found.initial),
         values=dict(found.values),
-        intervals={name: found.interval(name) for name in found.decades if isfinite(found.decades[name])},
-        units={knob.name: knob.unit for knob in dataset.knobs},
+        intervals={name: (low, high) for name, (low, high) in intervals.items() if isfinite(high - low)},
+        units=dict(found.units),
         seconds=found.seconds,
         log_likelihood_before=found.log_likelihood_before,
         log_likelihood_after=found.log_likelihood_after,
         evaluations=found.evaluations,
-        message=found.message,
+        message="; ".join([*filter(None, [found.message]), *map(found.doubt, found.unidentified)]),
     )
-    return tuned, dataset.build(found.values)

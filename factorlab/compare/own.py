@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
-import inspect
-import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 
 from factorlab.compare.accuracy import position_axes, scored_sensor
+from factorlab.compare.declaration import load_declaration
 from factorlab.datasets import Dataset, Truth
 from sequential.errors import DataError, MissingStreamError, ModelError
 from sequential.log import SensorLog, Stream
 from sequential.model import StateSpace
 from sequential.readers import read_log, read_tum
-from sequential.tuning import noise_knobs, scaled
 
-__all__ = ["load_model", "own_dataset", "read_truth", "require_log"]
+__all__ = ["own_dataset", "read_truth", "require_log"]
 
 TRUTH_GAP_S = 0.5  # truth is interpolated, but not across a pause of more than twice this
 
@@ -52,7 +47,7 @@ def own_dataset(path: Path, model: str, truth: Path | None = None, use_every: in
 
     Parameters
     ----------
-    model : `FILE.py:NAME`, a `StateSpace` or a function without arguments that returns one
+    model : `FILE.py:NAME`, a `StateSpace` or a function that returns one; see `load_declaration`
     truth : trajectory in TUM format
     use_every : 1 holds nothing out; else one reading in this many of the first position sensor (or of the
         first sensor of all) is used and the others score the result
@@ -61,7 +56,8 @@ def own_dataset(path: Path, model: str, truth: Path | None = None, use_every: in
     ------
     DataError, ModelError
     """
-    declared = load_model(model)
+    given = load_declaration(model)
+    declared = given.model
     log = read_log(path)
     _require_streams(path, declared, log)
     held_out: Stream | None = None
@@ -87,84 +83,11 @@ def own_dataset(path: Path, model: str, truth: Path | None = None, use_every: in
         held_out=held_out,
         truth=real,
         axes=axes or 2,
-        knobs=noise_knobs(declared),
-        build=lambda values: scaled(declared, values),
+        knobs=given.knobs,
+        build=given.build,
         notes=tuple(notes),
         default_estimators=("ekf", "iekf", "ukf", "ekf_rts", "ieks", "batch"),
     )
-
-
-def load_model(spec: str) -> StateSpace:
-    """The declaration that `FILE.py:NAME` names.
-
-    Raises
-    ------
-    ModelError
-        where the file cannot be run, has no such name, or the name is something else.
-    """
-    file, _, name = spec.rpartition(":")
-    if not file or not name.isidentifier():
-        msg = f"--model is FILE.py:NAME, such as robot.py:MODEL; got {spec!r}"
-        raise ModelError(msg)
-    module = _run_file(Path(file))
-    found = getattr(module, name, None)
-    if found is None:
-        names = [key for key, value in vars(module).items() if not key.startswith("_")]
-        near = get_close_matches(name, names, n=1, cutoff=0.5)
-        spaces = [key for key in names if isinstance(getattr(module, key), StateSpace)]
-        hint = f"did you mean {near[0]!r}?" if near else f"its models are {', '.join(spaces) or 'none'}"
-        msg = f"{file} declares no {name!r}; {hint}"
-        raise ModelError(msg)
-    return _as_model(found, file, name)
-
-
-def _as_model(found: Any, file: str, name: str) -> StateSpace:
-    if isinstance(found, StateSpace):
-        return found
-    if inspect.isfunction(found) and not inspect.signature(found).parameters:
-        made = found()
-        if isinstance(made, StateSpace):
-            return made
-        msg = f"{file}: {name}() returned a {type(made).__name__}; a StateSpace is needed"
-        raise ModelError(msg)
-    wanted = "a StateSpace, or a function without arguments that returns one"
-    msg = f"{file}: {name} is a {type(found).__name__}; {wanted}, is needed"
-    raise ModelError(msg)
-
-
-def _run_file(path: Path) -> ModuleType:
-    if not path.is_file():
-        near = get_close_matches(path.name, [p.name for p in path.parent.glob("*.py")], n=1)
-        hint = f"did you mean {path.parent / near[0]}?" if near else "--model takes FILE.py:NAME"
-        msg = f"there is no file {path}; {hint}"
-        raise ModelError(msg)
-    made = importlib.util.spec_from_file_location(path.stem, path)
-    if made is None or made.loader is None:
-        msg = f"{path} is not a Python file; --model takes FILE.py:NAME"
-        raise ModelError(msg)
-    module = importlib.util.module_from_spec(made)
-    sys.path.insert(0, str(path.parent.resolve()))  # as if the file were run: it may import its neighbours
-    try:
-        made.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        line = _line_in(path, error)
-        msg = f"{path}{line} raised {type(error).__name__}: {error}"
-        raise ModelError(msg) from error
-    finally:
-        sys.path.pop(0)
-    return module
-
-
-def _line_in(path: Path, error: BaseException) -> str:
-    """`, line 12`: the last line of the user's own file on the way to an error."""
-    if isinstance(error, SyntaxError):
-        return f", line {error.lineno}"
-    trace, last = error.__traceback__, None
-    while trace is not None:
-        if Path(trace.tb_frame.f_code.co_filename) == path:
-            last = trace.tb_lineno
-        trace = trace.tb_next
-    return f", line {last}" if last else ""
 
 
 def read_truth(path: Path) -> Truth:

@@ -10,7 +10,7 @@ from factorlab.compare.estimators import KINDS
 from factorlab.compare.table import Comparison, Row, Tuned
 from factorlab.compare.verdict import Finding
 
-__all__ = ["band", "cells", "figure", "headings", "headline", "terminal", "tuning_lines"]
+__all__ = ["band", "cells", "figure", "headings", "headline", "terminal", "tuning_lines", "verdict_lines"]
 
 NOTHING = "–"
 WIDTH = 110
@@ -130,7 +130,7 @@ def terminal(comparison: Comparison) -> Iterable[str]:
     if told := headline(comparison):
         yield from wrap(told, WIDTH)
         yield ""
-    yield from _verdict(comparison.findings)
+    yield from verdict_lines(comparison.findings)
     if comparison.tuned is not None:
         yield from _table(comparison, comparison.untuned, "noise as shipped")
         yield from _tuning(comparison.tuned)
@@ -142,7 +142,8 @@ def terminal(comparison: Comparison) -> Iterable[str]:
     yield from (f"- {note}" for note in comparison.dataset.notes)
 
 
-def _verdict(findings: tuple[Finding, ...]) -> Iterable[str]:
+def verdict_lines(findings: tuple[Finding, ...]) -> Iterable[str]:
+    """Each finding with its value, what it means and what to do."""
     for finding in findings:
         limits = f"  [{band(finding.band95)}]" if finding.band95 else ""
         value = f"  {figure(finding.value)}{limits}" if finding.value is not None else ""

@@ -30,6 +30,7 @@ class Verdict:
 
     nis: Mapping[str, Consistency]
     white: Mapping[str, Whiteness] = field(default_factory=dict)
+    bounded: Mapping[str, str] = field(default_factory=dict)  # sensors whose NIS is, and by what
 
     @property
     def consistent(self) -> bool:
@@ -52,7 +53,8 @@ class Verdict:
             return f"NIS of {name}: no reading"
         low, high = one.band
         band = f"95 % band {low:.3g}-{high:.3g}"
-        told = f"mean NIS of {name} {one.mean:.3g}, {one.expected:.3g} expected ({band}): {one.verdict}"
+        by = f" (bounded by its {self.bounded[name]})" if name in self.bounded else ""
+        told = f"mean NIS of {name}{by} {one.mean:.3g}, {one.expected:.3g} expected ({band}): {one.verdict}"
         test = self.white.get(name)
         if test is None:
             return told
@@ -76,6 +78,7 @@ class Verdict:
         one, test = self.nis[name], self.white.get(name)
         plain: dict[str, Any] = {
             "mean_nis": one.mean,
+            "bounded_by": self.bounded.get(name),
             "expected": one.expected,
             "band95": list(one.band),
             "inside": one.inside_band,
@@ -95,12 +98,14 @@ def judge(innovations: Mapping[str, Innovations], sensors: Mapping[str, SensorMo
     ----------
     sensors : of the model, for their gates and losses
     """
-    nis, white = {}, {}
+    nis, white, bounded = {}, {}, {}
     for name, seen in innovations.items():
         nis[name] = _consistency(seen, sensors[name])
+        if sensors[name].loss is not None or sensors[name].gate is not None:
+            bounded[name] = "gate" if sensors[name].loss is None else "loss"
         if int(seen.accepted.sum()) >= ENOUGH:
             white[name] = whiteness(seen, level=SURE)
-    return Verdict(nis, white)
+    return Verdict(nis, white, bounded)
 
 
 def _consistency(seen: Innovations, sensor: SensorModel) -> Consistency:
