@@ -11,7 +11,7 @@ __all__ = ["in_words", "invariant_kernel"]
 
 Array = NDArray[np.float64]
 
-SMALL = 0.05  # components below this share of the largest are left out of a name
+SMALL = 0.1  # components below this share of the largest are left out of a name
 CLOSE = 1e-9  # relative size below which a mapping counts as zero
 
 

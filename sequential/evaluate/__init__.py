@@ -15,6 +15,7 @@ from sequential.evaluate.consistency import (
 )
 from sequential.evaluate.diagnose import Finding, diagnose
 from sequential.evaluate.monte_carlo import MonteCarlo, monte_carlo
+from sequential.evaluate.observability import NamedDirection, Observability, observability
 from sequential.evaluate.pose_error import PoseErrors, ape, rpe, statistics
 from sequential.evaluate.trajectory import Trajectory, associate, interpolate
 from sequential.evaluate.whiteness import Whiteness, autocorrelation, whiteness
@@ -28,6 +29,8 @@ __all__ = [
     "Consistency",
     "Finding",
     "MonteCarlo",
+    "NamedDirection",
+    "Observability",
     "PoseErrors",
     "Trajectory",
     "Whiteness",
@@ -46,6 +49,7 @@ __all__ = [
     "nees",
     "nis_summary",
     "normalised_error",
+    "observability",
     "rpe",
     "statistics",
     "summarise",

@@ -13,7 +13,7 @@ from sequential.history import Innovations
 from sequential.smoothers.leave_one_out import look_back
 from sequential.timeline import Problem
 
-__all__ = ["predict", "predicted_innovations"]
+__all__ = ["dead_reckoning", "look_back", "predict", "predicted_innovations"]
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,27 @@ def predict(problem: Problem, mean: Array, cov: Array) -> tuple[Array, Array]:
     before[1:] = transition[1:] @ cov[:-1] @ np.swapaxes(transition[1:], 1, 2) + noise[1:]
     arrived[0], before[0] = prior.mean, prior.cov
     return arrived, before
+
+
+def dead_reckoning(problem: Problem, start: Array, first: int, last: int) -> tuple[Array, Array]:
+    """The path that the process makes from a state at node `first` without readings.
+
+    Returns
+    -------
+    path : (last - first + 1, n)
+    transition : (last - first + 1, d, d) Jacobians from node to node; entry 0 is the identity
+    """
+    from sequential.kernels.walking import walk
+
+    whole, plan = compiled(problem.model), problem.schedule
+    span = slice(first, last + 2)
+    plan = plan._replace(step_ptr=plan.step_ptr[span], reading_ptr=plan.reading_ptr[span])
+    path = np.tile(start, (last - first + 1, 1))
+    square = (len(path), whole.tables.d, whole.tables.d)
+    transition = np.empty(square)
+    walk(whole.tables, plan, path, path, transition, np.empty(square))  # each arrival is the next start
+    whole.raise_failures()
+    return path, transition
 
 
 def predicted_innovations(problem: Problem, mean: Array, cov: Array) -> Mapping[str, Innovations]:
