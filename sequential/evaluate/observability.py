@@ -216,10 +216,12 @@ def _named(model: StateSpace, start: Array, units: Array, hidden: Array) -> list
             found.append(NamedDirection(symmetry.words, symmetry.direction, 0.0))
             left = _without(left, fresh)
     if left.shape[1]:
-        found += [
-            NamedDirection(_words(model, start, one, units), one * units, 0.0) for one in pivoted(left).T
-        ]
+        found += [_open(model, start, one, units) for one in pivoted(left).T]
     return found
+
+
+def _open(model: StateSpace, start: Array, vector: Array, units: Array) -> NamedDirection:
+    return NamedDirection(_words(model, start, vector, units), vector * units, 0.0)
 
 
 def _without(basis: Array, direction: Array) -> Array:
