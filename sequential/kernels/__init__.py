@@ -30,6 +30,7 @@ INLINED = (
     "kernels/modes.py",
     "kernels/extended.py",
     "kernels/factored.py",
+    "kernels/information.py",
     "kernels/charts.py",
     "kernels/handles.py",
     "kernels/slots.py",

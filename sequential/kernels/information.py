@@ -16,7 +16,7 @@ from numba import njit, types
 from sequential.kernels.arrays import f1, f2
 from sequential.kernels.belief import LOG_TWO_PI, admit
 from sequential.kernels.bierman import factor_ud, update_ud_by_scalar
-from sequential.kernels.call import bare, call, inlined
+from sequential.kernels.call import allocating, bare, call, inlined
 from sequential.kernels.charts import retract
 from sequential.kernels.informing import covariance, inform, invert
 from sequential.kernels.matrices import (
@@ -150,16 +150,25 @@ def filter_nodes(model, plan, x, u, diagonal, p, phi, work, update, expected, re
     return log_likelihood, -1
 
 
-@njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, FILTERED), cache=True, error_model="numpy")
-def filter_information(model, plan, prior_mean, prior_cov, keep, out):
-    """Run the filter; returns (log likelihood, code).
+@bare
+def open_information(p, d, u, diagonal, array, weights, inverse):
+    """U D Uᵀ = P⁻¹ of a covariance, and P itself made symmetric; returns False where P is singular."""
+    # Y = U⁻ᵀ D⁻¹ U⁻¹ of the covariance's factors, made triangular the other way round
+    factor_ud(p, d, u, diagonal)
+    if not covariance(u, diagonal, d, inverse, p):
+        return False
+    for j in range(d):
+        weights[j] = 1.0 / diagonal[j]
+        for i in range(d):
+            array[i, j] = inverse[j, i]
+    orthogonalise(array, weights, d, d, u, diagonal)
+    return True
 
-    The code is -1, or the reading at which S or R was not positive definite, or -2 - k where the way to node
-    k has a singular transition, an indefinite noise, or loses all information on a direction.
-    """
+
+@allocating
+def follow(model, plan, x, u, diagonal, p, known, keep, out):
+    """Run the filter from x and U, D, in place, or if not `known` from P; see `filter_information`."""
     n, d, widest = model.n, model.d, plan.z.shape[1]
-    x, p, phi = prior_mean.copy(), prior_cov.copy(), np.eye(d)
-    u, diagonal = np.empty((d, d)), np.empty(d)
     work = (
         np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)), np.empty((d, d)), np.empty(d),
         np.empty((d + 1, d + widest)), np.empty(d + widest), np.empty((d, d)), np.empty(d), np.empty(d),
@@ -170,15 +179,20 @@ def filter_information(model, plan, prior_mean, prior_cov, keep, out):
         np.empty((widest, d)), flat, np.empty((widest, widest)), np.empty(d), np.empty((widest, d)),
         np.empty((widest, widest)), np.empty((2, max(widest, d))), np.empty((d + 1, d + 1)), np.empty(d + 1),
     )  # fmt: skip
-    # Y = U⁻ᵀ D⁻¹ U⁻¹ of the prior's factors, made triangular the other way round
-    factor_ud(prior_cov, d, u, diagonal)
-    if not covariance(u, diagonal, d, work[8], p):
+    if not known and not open_information(p, d, u, diagonal, work[6], work[7], work[8]):
         return 0.0, -2
-    for j in range(d):
-        work[7][j] = 1.0 / diagonal[j]
-        for i in range(d):
-            work[6][i, j] = work[8][j, i]
-    orthogonalise(work[6], work[7], d, d, u, diagonal)
     return filter_nodes(
-        model, plan, x, u, diagonal, p, phi, work, update, np.empty(widest), np.empty(widest), keep, out
+        model, plan, x, u, diagonal, p, np.eye(d), work, update, np.empty(widest), np.empty(widest), keep, out
     )
+
+
+@njit(FINISHED(MODEL, SCHEDULE, f1, f2, types.int64, FILTERED), cache=True, error_model="numpy")
+def filter_information(model, plan, prior_mean, prior_cov, keep, out):
+    """Run the filter; returns (log likelihood, code).
+
+    The code is -1, or the reading at which S or R was not positive definite, or -2 - k where the way to node
+    k has a singular transition, an indefinite noise, or loses all information on a direction.
+    """
+    d = model.d
+    x, p, u, diagonal = prior_mean.copy(), prior_cov.copy(), np.empty((d, d)), np.empty(d)
+    return follow(model, plan, x, u, diagonal, p, False, keep, out)

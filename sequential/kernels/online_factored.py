@@ -5,15 +5,13 @@ The factors travel beside the covariance in the belief, so that nothing of them 
 
 from __future__ import annotations
 
-import math
-
 from numba import njit, types
 
 from sequential.kernels.arrays import f0, f1, f2, i0, w1, w2
 from sequential.kernels.factored import follow, open_factors
 from sequential.kernels.handles import loader
 from sequential.kernels.records import FILTERED, MODEL, SCHEDULE
-from sequential.kernels.slots import REFUSED, SLOTS, place, report
+from sequential.kernels.slots import REFUSED, SLOTS, pack, place, unpack
 
 __all__ = ["factored_step"]
 
@@ -31,25 +29,7 @@ def factored_step(address, dt, sensor, belief, z, u, context, noise, out):
     if not place(model, slots, filtered, dt, sensor, z, u, context, noise):
         return REFUSED
     x, cov, factor, diagonal = scratch
-    n, d = model.n, model.d
-    begin = n + d * d
-    for i in range(n):
-        x[i] = belief[i]
-    for i in range(d):
-        diagonal[i] = belief[begin + d * d + i]
-        for j in range(d):
-            cov[i, j] = belief[n + i * d + j]
-            factor[i, j] = belief[begin + i * d + j]
-    if math.isnan(belief[begin]):
-        open_factors(form, cov, d, factor, diagonal)
+    if not unpack(model, belief, x, cov, factor, diagonal):
+        open_factors(form, cov, model.d, factor, diagonal)
     log_likelihood, failed = follow(model, plan, x, factor, diagonal, form, iterations, 0, filtered)
-    for i in range(n):
-        out[i] = filtered.mean[0, i]
-    for i in range(d):
-        out[begin + d * d + i] = diagonal[i]
-        for j in range(d):
-            out[n + i * d + j] = filtered.cov[0, i, j]
-            out[begin + i * d + j] = factor[i, j]
-    if failed != -1:
-        log_likelihood = math.nan
-    return report(model, filtered, begin + d * d + d, log_likelihood, out)
+    return pack(model, filtered, factor, diagonal, log_likelihood, failed, out)

@@ -14,7 +14,7 @@ from numba import types
 from sequential.kernels.arrays import i1, w1, w2, w3
 from sequential.kernels.call import inlined
 
-__all__ = ["DONE", "LOST", "REFUSED", "SLOTS", "Slots", "place", "report"]
+__all__ = ["DONE", "LOST", "REFUSED", "SLOTS", "Slots", "pack", "place", "report", "unpack"]
 
 DONE, REFUSED, LOST = 0, 1, 2  # what a step returns: numbers that cannot be used came in, or came out
 _wi = types.int64[::1]
@@ -110,3 +110,34 @@ def report(model, filtered, at, log_likelihood, out):
         if not math.isfinite(out[i]):
             return LOST
     return DONE
+
+
+@inlined
+def unpack(model, belief, x, cov, factor, diagonal):
+    """Mean, covariance and factors of a belief [mean | covariance | U | D]; False where U is not known."""
+    n, d = model.n, model.d
+    begin = n + d * d
+    for i in range(n):
+        x[i] = belief[i]
+    for i in range(d):
+        diagonal[i] = belief[begin + d * d + i]
+        for j in range(d):
+            cov[i, j] = belief[n + i * d + j]
+            factor[i, j] = belief[begin + i * d + j]
+    return not math.isnan(belief[begin])
+
+
+@inlined
+def pack(model, filtered, factor, diagonal, log_likelihood, failed, out):
+    """Write a belief with its factors, and the innovation; returns the code of the step."""
+    n, d = model.n, model.d
+    begin = n + d * d
+    for i in range(n):
+        out[i] = filtered.mean[0, i]
+    for i in range(d):
+        out[begin + d * d + i] = diagonal[i]
+        for j in range(d):
+            out[n + i * d + j] = filtered.cov[0, i, j]
+            out[begin + i * d + j] = factor[i, j]
+    code = report(model, filtered, begin + d * d + d, log_likelihood, out)
+    return code if failed == -1 else LOST

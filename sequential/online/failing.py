@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import FactorlabError, NotFiniteError, NotPositiveDefiniteError, TimeOrderError
+from sequential.errors import (
+    FactorlabError,
+    ModelError,
+    NotFiniteError,
+    NotPositiveDefiniteError,
+    TimeOrderError,
+)
 from sequential.online.ports import Port
 
 __all__ = ["backwards", "failure"]
@@ -14,7 +20,7 @@ Array = NDArray[np.float64]
 REFUSED = 1  # as in kernels.slots
 
 
-def failure(code: int, port: Port | None, z: Array, u: Array, belief: Array) -> FactorlabError:
+def failure(code: int, port: Port | None, z: Array, u: Array, belief: Array, form: str) -> FactorlabError:
     """The error for a kernel's code; `belief` holds the mean and the covariance that it left."""
     reading = "" if port is None else f"a reading of {port.name!r}"
     if code == REFUSED:
@@ -24,6 +30,11 @@ def failure(code: int, port: Port | None, z: Array, u: Array, belief: Array) -> 
         return NotFiniteError(
             f"the belief is no longer finite after {what}: a model function returned NaN or infinity, or the "
             "state diverged; evaluate step and observe at the mean that was handed in"
+        )
+    if form == "information":
+        return ModelError(
+            f"the information form cannot make {what}: the transition or the noise of the reading cannot be "
+            "inverted, or no information is left on some direction; use form='ud'"
         )
     return NotPositiveDefiniteError(
         f"{what} failed, since a covariance is not positive definite: the state diverged, or noise_cov is "

@@ -136,12 +136,13 @@ def extended(model: StateSpace, form: str, iterations: int) -> Lowered:
         from sequential.kernels.online_extended import extended_step, make_workspace
 
         return Lowered(extended_step, make_workspace(n, d, width), (iterations,))
+    factors = (np.zeros(n), np.zeros((d, d)), np.zeros((d, d)), np.zeros(d))
     if form in {"ud", "sqrt"}:
         from sequential.kernels.factored import ROOT, UD
         from sequential.kernels.online_factored import factored_step
 
-        scratch = (np.zeros(n), np.zeros((d, d)), np.zeros((d, d)), np.zeros(d))
         settings = (UD if form == "ud" else ROOT, iterations)
-        return Lowered(factored_step, scratch, settings, form, d * d + d)
-    msg = f"form={form!r} has no online form; use form='joseph' or 'ud', or run(…) on a whole log"
-    raise ModelError(msg)
+        return Lowered(factored_step, factors, settings, form, d * d + d)
+    from sequential.kernels.online_information import information_step
+
+    return Lowered(information_step, factors, (), form, d * d + d)

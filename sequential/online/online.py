@@ -179,4 +179,4 @@ class Online:
     def _failed(self, code: int, port: Port | None, z: Array, u: Array, out: Array) -> FactorlabError:
         """The error for a step that failed; raises what a model function raised."""
         self._kept.whole.raise_failures()
-        return failure(code, port, z, u, out[: self._layout.belief])
+        return failure(code, port, z, u, out[: self._layout.belief], self._layout.form)

@@ -61,6 +61,22 @@ def turned():
     return online, online.start()
 
 
+def forget(x, dt):
+    return 0.0 * dt * x
+
+
+def informed():
+    model = sq.StateSpace(
+        sq.Vector(1),
+        sq.Gaussian([1.0], [1.0]),
+        sq.Process(forget, noise_density=1.0),
+        {"z": sq.LinearSensor([[1.0]], 0.0)},
+        check=False,
+    )
+    online = sq.Online(sq.ExtendedKalmanFilter(form="information"), model)
+    return online, online.start()
+
+
 NAN, INF = math.nan, math.inf
 MISTAKES = [
     (carted, lambda o, b: o.update(b, "gps", 1.0), r"no sensor 'gps'; it has 'position', 'both'"),
@@ -96,6 +112,16 @@ MISTAKES = [
         r"whole or missing: make every",
     ),
     (rooted, lambda o, b: o.predict(b, 0.1), r"no longer finite after the prediction: a model function"),
+    (
+        informed,
+        lambda o, b: o.predict(b, 0.1),
+        r"information form cannot make the prediction: the",
+    ),
+    (
+        informed,
+        lambda o, b: o.update(b, "z", 1.0),
+        r"make the update by a reading of 'z': .* form='ud'",
+    ),
     (
         rooted,
         lambda o, b: o.step(b, 0.1, "z", 1.0),

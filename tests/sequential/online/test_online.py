@@ -15,6 +15,7 @@ FILTERS = [
     sq.ExtendedKalmanFilter(form="ud"),
     sq.ExtendedKalmanFilter(form="sqrt"),
     sq.IteratedExtendedKalmanFilter(form="ud"),
+    sq.ExtendedKalmanFilter(form="information"),
 ]
 every_filter = pytest.mark.parametrize("estimator", FILTERS, ids=lambda e: e.name)
 every_world = pytest.mark.parametrize("world", worlds.EVERY_WORLD, ids=repr)
@@ -121,6 +122,12 @@ def test_a_belief_may_be_handed_from_filter_to_filter_and_be_ones_own():
     begun = one.predict(one.start(), 0.3)
     same = other.update(begun, "position", 0.1)[0]
     np.testing.assert_array_equal(same.mean, one.update(begun, "position", 0.1)[0].mean)
+    for form in ("ud", "sqrt", "information"):
+        factored = sq.Online(sq.KalmanFilter(form=form), model)
+        there, _ = factored.update(begun, "position", 0.1)
+        back, _ = one.update(there, "position", 0.2)
+        np.testing.assert_allclose(there.cov, same.cov, rtol=1e-12)
+        np.testing.assert_allclose(back.mean, one.update(same, "position", 0.2)[0].mean, rtol=1e-12)
     own = other.belief(begun.gaussian(), begun.t)
     np.testing.assert_array_equal(other.update(own, "position", 0.1)[0].mean, same.mean)
     assert own.manifold is model.manifold
