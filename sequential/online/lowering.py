@@ -20,6 +20,12 @@ from sequential.timeline import Schedule
 
 __all__ = ["Handle", "handle"]
 
+WHY_NOT = {
+    "InteractingMultipleModel": "it mixes its models at the nodes of a log, which single samples do not have",
+    "ParticleFilter": "its belief is a cloud of particles and not a mean with a covariance",
+    "FixedLagSmoother": "it solves a window of the chain anew at every node of a log",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Lowered:
@@ -109,7 +115,8 @@ def lowered(estimator: Any, model: StateSpace) -> Lowered:
     """Lower a filter; registered for every one that has an online form."""
     name = type(estimator).__name__
     known = ", ".join(sorted(kind.__name__ for kind in lowered.registry if kind is not object))
-    msg = f"{name} has no online form; take one of {known}, or run({name}(…), model, log) on a whole log"
+    why = WHY_NOT.get(name, "it needs the whole log")
+    msg = f"{name} has no online form: {why}; take one of {known}, or run({name}(…), model, log)"
     raise ModelError(msg)
 
 

@@ -69,6 +69,10 @@ class Online:
         self._size, self._failures = self._layout.size, self._kept.whole.failures
         self._ports, self._driven = ports_of(model), model.process_functions.inputs > 0
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # a copy, also in another process, needs records and scratch memory of its own
+        return Online, (self.filter, self.model)
+
     def start(self, t: float | None = None) -> Belief:
         """The prior, at the model's start or else zero, unless a time is given (float s or int ns)."""
         return self.belief(self.model.prior, (self.model.start_ns or 0) if t is None else t)

@@ -143,10 +143,18 @@ def test_a_mistake_is_a_sentence_and_does_no_harm(make, mistake, sentence):
 @pytest.mark.parametrize(
     ("estimator", "sentence"),
     [
-        (sq.IteratedSmoother(), "IteratedSmoother has no online form; take one of ExtendedKalmanFilter"),
+        (sq.IteratedSmoother(), "IteratedSmoother has no online form: it needs the whole log; take one of"),
+        (
+            sq.InteractingMultipleModel([worlds.unicycle_range_bearing().model] * 2, transition=0.9),
+            "InteractingMultipleModel has no online form: it mixes its models at the nodes of a log",
+        ),
+        (
+            sq.ParticleFilter(rng=np.random.default_rng(1)),
+            "ParticleFilter has no online form: its belief is a cloud of particles",
+        ),
         (sq.KalmanFilter(), "KalmanFilter takes linear models only: the state lives on"),
     ],
-    ids=["a smoother", "a model that is not linear"],
+    ids=["a smoother", "models", "particles", "a model that is not linear"],
 )
 def test_a_filter_that_cannot_says_so(estimator, sentence):
     with pytest.raises(FactorlabError, match=sentence):

@@ -1,5 +1,6 @@
 """Sample by sample: the same numbers as the whole log, beliefs that are values, and mistakes as sentences."""
 
+import copy
 import math
 from concurrent.futures import ThreadPoolExecutor
 
@@ -182,6 +183,16 @@ def test_any_layout_of_numbers_is_understood():
         np.testing.assert_array_equal(online.update(begun, "both", z)[0].mean, expected.mean)
     scalar, _ = online.update(begun, "position", 2)
     np.testing.assert_array_equal(scalar.mean, online.update(begun, "position", np.array([2.0]))[0].mean)
+
+
+def test_a_copy_has_memory_of_its_own():
+    online = sq.Online(sq.KalmanFilter(), cart())
+    expected, _ = online.update(online.start(), "position", 0.4)
+    twin = copy.deepcopy(online)
+    assert twin._address != online._address
+    del online
+    np.testing.assert_array_equal(twin.update(twin.start(), "position", 0.4)[0].mean, expected.mean)
+    assert twin.filter == sq.KalmanFilter()
 
 
 def test_threads_with_filters_of_their_own_do_not_meet(rng):
