@@ -14,13 +14,15 @@ from sequential.errors import FactorlabError, ModelError
 from sequential.filters import ExtendedKalmanFilter
 from sequential.jacobians import unchecked
 from sequential.log import SensorLog
+from sequential.manifold import Product
 from sequential.model import Gaussian, StateSpace
+from sequential.models import Independent
 from sequential.smoothers.pairs import SmoothedPairs, smoothed_pairs
 from sequential.timeline import Problem, prepare
 from sequential.tuning.em_result import Fit, as_tuning
 from sequential.tuning.moments import Moments, moments, process_noise, scale_of
 from sequential.tuning.result import Tuning
-from sequential.tuning.scaling import scaled_process, with_noise_cov
+from sequential.tuning.scaling import process_parts, with_noise_cov, with_parts_scaled
 from sequential.tuning.structure import Structure, fitted
 
 __all__ = ["expectation_maximization"]
@@ -53,7 +55,8 @@ def expectation_maximization(
     ----------
     process : which entries of the process noise change: None (those that are not zero as declared), "full",
         "diagonal", "scale" (one factor), "held", or a mask (d, d) made of blocks.  A process that is declared
-        by something else than a matrix (densities of its own, a function of the interval) takes one factor
+        by something else than a matrix (densities of its own) takes one factor, an `Independent` one for
+        each of its parts
     sensors : the same for noise_cov, by sensor or for all
     prior : "held", "mean", or "both" (mean and covariance; one recording says little about the latter)
     iterations, tolerance : stop after so many, or when the log likelihood gains less than this in one
@@ -199,7 +202,7 @@ class _Plan:
         if self.form == "held" or not len(found.dt):
             return own
         if self.form == "scale":
-            return scaled_process(own, scale_of(process_noise(problem, pairs), found.process) ** 0.5)
+            return with_parts_scaled(own, _factors(problem, process_noise(problem, pairs), found.process))
         declared = _matrix(own, self.field, problem.model.manifold.dim)
         second = found.process / (found.dt[:, None, None] if self.form == "density" else 1.0)
         fitting = fitted(self.process, declared, second.mean(axis=0), "the process noise")
@@ -209,6 +212,17 @@ class _Plan:
         if self.prior == "held":
             return model.prior
         return Gaussian(pairs.mean[0], model.prior.cov if self.prior == "mean" else pairs.cov[0])
+
+
+def _factors(problem: Problem, noise: Array, second: Array) -> dict[str, float]:
+    """The factor on σ of each part of the process, by the directions of the state that it moves."""
+    own, manifold, found = problem.model.process, problem.model.manifold, {}
+    for name in process_parts(own):
+        rows = slice(0, manifold.dim)
+        if isinstance(own, Independent) and isinstance(manifold, Product):
+            rows = manifold.tangent(name.partition(" ")[2])
+        found[name] = scale_of(noise[:, rows, rows], second[:, rows, rows]) ** 0.5
+    return found
 
 
 def _matrix(process: Any, field: str, dim: int) -> Array:
@@ -226,4 +240,4 @@ def _form(problem: Problem, process: Structure) -> tuple[str, str]:
         given = getattr(own, field, None)
         if given is not None and np.ndim(given) <= 2 and single and not isinstance(own, Mapping):
             return form, field
-    return ("held", "") if scaled_process(own, 1.0) is None else ("scale", "")
+    return ("scale", "") if process_parts(own) else ("held", "")

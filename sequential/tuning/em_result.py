@@ -16,7 +16,7 @@ from sequential.jacobians import unchecked
 from sequential.model import SensorModel, StateSpace
 from sequential.timeline import Problem
 from sequential.tuning.result import Tuning
-from sequential.tuning.scaling import noise_numbers, scaled_process, with_noise_cov
+from sequential.tuning.scaling import noise_numbers, process_parts, with_noise_cov, with_parts_scaled
 from sequential.tuning.search import curvature
 from sequential.tuning.verdict import judge
 
@@ -147,12 +147,12 @@ def _of_process(fit: Fit) -> list[_Level]:
     if fit.form == "held":
         return []
     if not field:
-        factor = scale_between(fit.declared.process, fit.fitted.process)
-
-        def whole(model: StateSpace, by: float) -> StateSpace:
-            return replace(model, process=scaled_process(model.process, by) or model.process)
-
-        return [_Level("process σ", "×", 1.0, factor, whole)]
+        old, new = (process_parts(m.process) for m in (fit.declared, fit.fitted))
+        return [
+            _Level(f"{name} σ", "×", 1.0, scale_between(one, new[name]), _turn_part(name))
+            for name, one in old.items()
+            if name in new
+        ]
     dim, unit = fit.fitted.manifold.dim, "/√s" if fit.form == "density" else ""
     before, after = (_diagonal(m.process, field, dim) for m in (fit.declared, fit.fitted))
     labels = fit.fitted.manifold.labels()
@@ -163,6 +163,13 @@ def _of_process(fit: Fit) -> list[_Level]:
         for k in range(dim)
         if before[k] > 0.0 or after[k] > 0.0
     ]
+
+
+def _turn_part(name: str) -> Callable[[StateSpace, float], StateSpace]:
+    def turn(model: StateSpace, factor: float) -> StateSpace:
+        return replace(model, process=with_parts_scaled(model.process, {name: factor}))
+
+    return turn
 
 
 def process_field(fit: Fit) -> str:

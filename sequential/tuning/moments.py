@@ -15,6 +15,7 @@ from sequential.timeline import Problem
 __all__ = ["Moments", "moments", "process_noise"]
 
 Array = NDArray[np.float64]
+FEW = 32  # different intervals: for more, the noise is what the filter's prediction added
 TINY = 1e-9  # of the largest eigenvalue of a normalised Q: below, a direction has no noise of its own
 
 
@@ -88,9 +89,11 @@ def process_noise(problem: Problem, pairs: SmoothedPairs) -> Array:
     """(K-1, d, d) covariance that the process adds on the way to each node."""
     f, plan, d = problem.model.process_functions, problem.schedule, problem.model.manifold.dim
     steps = np.diff(plan.step_ptr)[1:]
-    if f.noise is not None and problem.model.process.linear and f.inputs == 0 and (steps == 1).all():
-        dt, kind = np.unique(plan.step_dt, return_inverse=True)
-        x, u = problem.model.prior.mean, np.zeros(1)
+    process = problem.model.process
+    steady = process.linear and not getattr(process, "rows", 0)  # its noise depends on the interval alone
+    dt, kind = np.unique(plan.step_dt, return_inverse=True)
+    if f.noise is not None and steady and len(dt) <= FEW and (steps == 1).all():
+        x, u = problem.model.prior.mean, np.zeros(max(f.inputs, 1))
         each = [evaluate(f.noise, x, u, float(one), f.params, d * d).reshape(d, d) for one in dt]
         return np.stack(each)[kind]
     ahead = pairs.forward.predicted

@@ -15,7 +15,16 @@ from sequential.models import Independent
 from sequential.noise import ImuNoise
 from sequential.tuning.knobs import Knob
 
-__all__ = ["noise_fields", "noise_knobs", "noise_numbers", "scaled", "scaled_process", "with_noise_cov"]
+__all__ = [
+    "noise_fields",
+    "noise_knobs",
+    "noise_numbers",
+    "process_parts",
+    "scaled",
+    "scaled_process",
+    "with_noise_cov",
+    "with_parts_scaled",
+]
 
 Array = NDArray[np.float64]
 PROCESS = "process"
@@ -26,8 +35,8 @@ SIGMAS = ("along", "across", "heading", "slip", "turn_slip", "drift", "accelerat
 
 
 def noise_knobs(model: StateSpace) -> tuple[Knob, ...]:
-    """A factor on the standard deviation of each sensor, and of the process where it can be scaled."""
-    names = [PROCESS] if scaled_process(model.process, 1.0) is not None else []
+    """A factor on the σ of each sensor, and on that of the process or of each independent part of it."""
+    names = list(process_parts(model.process))
     names += [name for name, sensor in model.sensors.items() if is_dataclass(sensor)]
     return tuple(Knob(f"{name} σ", 1.0, "×") for name in names)
 
@@ -38,8 +47,28 @@ def scaled(model: StateSpace, values: Mapping[str, float]) -> StateSpace:
     for name, sensor in model.sensors.items():
         factor = values.get(f"{name} σ", 1.0)
         sensors[name] = with_noise_cov(sensor, np.asarray(sensor.noise_cov) * factor**2)
-    process = scaled_process(model.process, values.get(f"{PROCESS} σ", 1.0)) or model.process
-    return replace(model, process=process, sensors=sensors)
+    factors = {name: values.get(f"{name} σ", 1.0) for name in process_parts(model.process)}
+    return replace(model, process=with_parts_scaled(model.process, factors), sensors=sensors)
+
+
+def process_parts(process: ProcessModel) -> dict[str, ProcessModel]:
+    """What can be scaled by itself: parts of an `Independent`, else the process; empty where nothing can."""
+    if isinstance(process, Independent):
+        parts = {f"{PROCESS} {name}": one for name, one in process.processes.items()}
+    else:
+        parts = {PROCESS: process}
+    return {name: one for name, one in parts.items() if noise_numbers(one).any() and _scaled(one, 1.0)}
+
+
+def with_parts_scaled(process: ProcessModel, factors: Mapping[str, float]) -> ProcessModel:
+    """The process, each part of it with its standard deviations multiplied; parts not named stay."""
+    if not isinstance(process, Independent):
+        return scaled_process(process, factors.get(PROCESS, 1.0)) or process
+    members = {
+        name: scaled_process(one, factors.get(f"{PROCESS} {name}", 1.0)) or one
+        for name, one in process.processes.items()
+    }
+    return Independent(**members)
 
 
 def with_noise_cov(sensor: Any, noise_cov: Any) -> Any:
@@ -91,7 +120,7 @@ def noise_numbers(process: Any) -> Array:
     if isinstance(process, Independent):
         return np.concatenate([noise_numbers(one) for one in process.processes.values()])
     found = [np.zeros(0)]
-    for _, value, power in noise_fields(process):
+    for _, value, power in noise_fields(process) if is_dataclass(process) else ():
         own = [getattr(value, f.name) for f in fields(value)] if isinstance(value, ImuNoise) else value
         found.append(np.maximum(np.ravel(np.asarray(own, dtype=np.float64)), 0.0) ** (1.0 / power))
     return np.concatenate(found)

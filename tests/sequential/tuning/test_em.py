@@ -253,3 +253,34 @@ def test_guarded_sensors_are_refused(guard, rng):
     model = dataclasses.replace(world.model, sensors=sensors)
     with pytest.raises(ModelError, match=r"sensor 'sum' has a .*tune"):
         sq.expectation_maximization(model, world.draw(rng).log)
+
+
+def test_independent_parts_have_a_factor_each(rng):
+    """Intervals that vary, one part with an input-free drift: each density is found, and the rest stays."""
+    state = sq.Product(motion=sq.Vector(2), bias=sq.Vector(1), still=sq.Vector(1))
+
+    def build(motion, bias):
+        parts = {
+            "motion": sq.ConstantVelocity(motion),
+            "bias": sq.GaussMarkov(50.0, bias),
+            "still": sq.RandomWalk(0.0),
+        }
+        sensors = {
+            "both": sq.LinearSensor([[1, 0, 1, 1]], 0.01),
+            "one": sq.LinearSensor([[1, 0, 0, 0]], 0.04),
+        }
+        prior = sq.Gaussian([0.0, 0.0, 0.0, 0.3], [1.0, 1.0, 0.25, 1e-6])
+        return sq.StateSpace(state, prior, sq.Independent(**parts), sensors, start=0.0)
+
+    t = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.6, 1500))])
+    log = sq.simulate(build(0.3, 0.5), t, rng).log
+    levels = history(build(3.0, 0.1), log)
+    assert np.diff(levels).min() > -1e-9 * abs(levels[-1])
+    found = sq.expectation_maximization(build(3.0, 0.1), log, iterations=300)
+    assert set(found.values) == {"process motion σ", "process bias σ", "both σ", "one σ"}
+    assert found.values["process motion σ"] == pytest.approx(0.1**0.5, rel=0.25)
+    assert found.values["process bias σ"] == pytest.approx(5.0, rel=0.4)
+    assert found.values["both σ"] == pytest.approx(0.1, rel=0.2)
+    parts = found.model.process.processes
+    assert parts["bias"].sigma == pytest.approx(0.1 * found.values["process bias σ"])
+    assert {knob.name for knob in sq.tuning.noise_knobs(build(3.0, 0.1))} == set(found.values)
