@@ -15,7 +15,7 @@ from sequential.jacobians import difference
 from sequential.log import Stream
 from sequential.manifold import SE2, SE3, NavState, Product, Vector
 from sequential.model import StateSpace, evaluate
-from sequential.models import ConstantVelocity, Position
+from sequential.models import ConstantAcceleration, ConstantVelocity, Position, Singer
 
 __all__ = ["Errors", "errors_of", "has_position", "position_axes", "scored_sensor"]
 
@@ -81,7 +81,7 @@ def position_axes(model: StateSpace, truth: Truth | None = None) -> int | None:
         return 3
     if any(isinstance(part, SE2) for part in parts):
         return 2
-    if isinstance(model.process, ConstantVelocity):
+    if isinstance(model.process, ConstantVelocity | ConstantAcceleration | Singer):
         return model.process.axes if model.process.axes in {2, 3} else None
     seen = [sensor.axes for sensor in model.sensors.values() if isinstance(sensor, Position)]
     if seen:

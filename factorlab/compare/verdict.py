@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from factorlab.compare.estimators import KINDS
 from sequential.errors import FactorlabError
 from sequential.evaluate import Blame, blame, diagnose
+from sequential.evaluate.observability import show
 from sequential.timeline import Problem
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ def findings_of(problem: Problem, rows: tuple[Row, ...]) -> tuple[Finding, ...]:
     found += [_unsettled(row) for row in solved if not row.converged]
     for row in (filters or smoothers)[:1]:
         found += _diagnosis(problem, row)
+    if solved:
+        found += _unseen(problem)
     found += [_honesty(row) for row in (*filters[:1], *smoothers[-1:]) if row.normalised_error is not None]
     return tuple(sorted(found, key=lambda finding: ORDER[finding.status]))
 
@@ -100,6 +103,20 @@ def _guilty(problem: Problem, row: Row) -> Blame | None:
         return blame(problem)
     except FactorlabError:
         return None
+
+
+def _unseen(problem: Problem) -> list[Finding]:
+    """Directions of the state that no reading shows: the prior alone decides there."""
+    try:
+        open_directions = show(problem).unobservable
+    except FactorlabError:
+        return []
+    action = "trust the prior there, add a sensor that shows it, or take it out of the state"
+    what = "no reading shows this of the start"
+    return [
+        Finding("observability", None, None, "WARN", f"{what}: {one.words}", action)
+        for one in open_directions
+    ]
 
 
 def _honesty(row: Row) -> Finding:

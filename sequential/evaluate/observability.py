@@ -105,7 +105,14 @@ def observability(
     unobservable is named by the first of these that fits: a component, a turn or a move of a pose, a mixture
     of few components, in standard deviations of the prior.
     """
-    problem = prepare(model, log, max_gap=max_gap)
+    return show(prepare(model, log, max_gap=max_gap), run, between)
+
+
+def show(
+    problem: Problem, run: Run | None = None, between: tuple[float, float] | None = None
+) -> Observability:
+    """What the readings of a problem show: `observability` for a log that is laid out already."""
+    model = problem.model
     first, last = _span(problem, run, between)
     start = model.prior.mean if run is None else run.mean[run.index(problem.t[[first]])[0]]
     rows = _rows(problem, start, first, last)

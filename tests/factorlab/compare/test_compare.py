@@ -21,7 +21,7 @@ def test_the_names_are_the_agreed_ones():
     assert NAMES == ("ekf", "iekf", "ukf", "ekf_rts", "ieks", "fixed_lag", "isam2", "isam2_final", "batch")
 
 
-@pytest.mark.parametrize("name", [*NAMES, "kf"])
+@pytest.mark.parametrize("name", [*NAMES, "kf", "kf_rts"])
 def test_an_estimator_carries_the_name_it_is_asked_by(name):
     assert make(name).name == name
 
@@ -87,6 +87,20 @@ def test_noise_that_is_too_small_is_blamed(walker):
     table = compare(dataclasses.replace(walker, model=timid), ("ekf", "ieks"))
     assert table.findings[0].status == "FAIL"
     assert any("noise of gps about" in f.action and f.status == "FAIL" for f in table.findings)
+
+
+def test_what_no_reading_shows_is_named(walker):
+    """Two tags with the same unknown offset: position and offset are one number to them."""
+    state = sq.Product(motion=sq.Vector(4), offset=sq.Vector(2))
+    process = sq.Independent(motion=sq.ConstantVelocity(0.04, axes=2), offset=sq.RandomWalk(1e-4))
+    both = np.hstack([np.eye(2, 4), np.eye(2)])
+    sensors = {"gps": sq.LinearSensor(both, 0.04 * np.eye(2)), "tag": sq.LinearSensor(both, 0.25 * np.eye(2))}
+    prior = sq.Gaussian([0, 0, 1.0, 0, 0, 0], [0.25] * 6)
+    shifted = dataclasses.replace(walker, model=sq.StateSpace(state, prior, process, sensors))
+    seen = [f for f in compare(shifted, ("kf", "kf_rts")).findings if f.metric == "observability"]
+    assert [f.status for f in seen] == ["WARN", "WARN"]
+    assert all("motion.x" in f.meaning and "offset.x" in f.meaning for f in seen)
+    assert not [f for f in compare(walker, ("ekf",)).findings if f.metric == "observability"]
 
 
 def test_a_solver_that_fails_is_a_row(walker, monkeypatch):

@@ -105,6 +105,23 @@ def test_compiled_and_plain_functions_agree(name, rng):
 
 
 @every_process
+@pytest.mark.parametrize(
+    "estimator", [sq.UnscentedKalmanFilter(), sq.IteratedSmoother()], ids=lambda e: e.name
+)
+def test_every_kernel_can_call_it(name, estimator, rng):
+    """Long steps are doubled up in scratch memory of the function's own."""
+    process, manifold = CONTINUOUS[name]
+    model = declare(process, manifold)
+    t = np.cumsum(np.concatenate([[0.0], rng.uniform(0.05, 4.0, 20)]))
+    u = rng.standard_normal((21, model.process_functions.inputs)) if model.input else None
+    log = sq.simulate(model, t, rng, inputs=u).log
+    run, kalman = (sq.run(e, model, log, max_gap=10.0) for e in (estimator, sq.KalmanFilter()))
+    scale = np.abs(kalman.cov).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(run.mean[-1], kalman.mean[-1], atol=1e-8)
+    np.testing.assert_allclose(run.cov[-1] / scale[-1], kalman.cov[-1] / scale[-1], atol=1e-8)
+
+
+@every_process
 @pytest.mark.slow
 def test_simulation_spreads_as_the_noise_says(name, seeds):
     """Covariance of many draws of one step, entry by entry, within five of its own standard errors."""
