@@ -9,7 +9,7 @@ import worlds
 import sequential as sq
 from sequential.errors import FactorlabError
 
-FILTERS = [sq.ExtendedKalmanFilter(), sq.IteratedExtendedKalmanFilter()]
+FILTERS = [sq.ExtendedKalmanFilter(), sq.IteratedExtendedKalmanFilter(), sq.ExtendedKalmanFilter(form="ud")]
 every_filter = pytest.mark.parametrize("estimator", FILTERS, ids=lambda e: e.name)
 every_world = pytest.mark.parametrize("world", worlds.EVERY_WORLD, ids=repr)
 
