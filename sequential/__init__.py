@@ -16,13 +16,16 @@ from sequential.discretise import van_loan
 from sequential.errors import FactorlabError
 from sequential.filterpy import from_filterpy
 from sequential.filters import (
+    CubatureKalmanFilter,
     ExtendedKalmanFilter,
     InteractingMultipleModel,
     IteratedExtendedKalmanFilter,
     KalmanFilter,
     ParticleFilter,
+    SigmaPoints,
     UnscentedKalmanFilter,
     resample,
+    sigma_points,
 )
 from sequential.history import Innovations, ModeHistory, ParticleHistory, Prediction, Report, Run
 from sequential.log import SensorLog, Stream
@@ -79,6 +82,7 @@ __all__ = [
     "ConstantVelocity",
     "ContinuousProcess",
     "CoordinatedTurn",
+    "CubatureKalmanFilter",
     "Direction",
     "Estimator",
     "ExtendedKalmanFilter",
@@ -120,6 +124,7 @@ __all__ = [
     "Run",
     "Sensor",
     "SensorLog",
+    "SigmaPoints",
     "Simulation",
     "Singer",
     "SlidingMedian",
@@ -141,6 +146,7 @@ __all__ = [
     "prepare",
     "resample",
     "run",
+    "sigma_points",
     "simulate",
     "steady_state",
     "stream",

@@ -1,8 +1,7 @@
-"""The unscented Kalman filter: sigma points instead of Jacobians."""
+"""The unscented and the cubature Kalman filter: sigma points instead of Jacobians."""
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
 
@@ -11,66 +10,104 @@ from numpy.typing import NDArray
 
 from sequential.compile import compiled
 from sequential.errors import ModelError
+from sequential.filters.sigma_sets import SigmaSet
 from sequential.filters.solution import allocate, as_run, require_finite, require_solved
 from sequential.history import Report, Run
 from sequential.timeline import Problem, sealed
 
-__all__ = ["UnscentedKalmanFilter"]
+__all__ = ["CubatureKalmanFilter", "UnscentedKalmanFilter"]
 
 
 @dataclass(frozen=True, slots=True)
 class UnscentedKalmanFilter:
-    """Carry 2d + 1 points through the models and regress on them (van der Merwe 2004, ch. 3).
+    """Carry sigma points through the models and regress on them (van der Merwe 2004, ch. 3).
 
-    The points are x and x ⊕ ±γ L_i, with L the lower Cholesky factor of the covariance and γ² = α² (d + κ).
-    They are drawn again before every step and every reading; noise is additive.
+    The points are x and x ⊕ L u, with L the lower Cholesky factor of the covariance, drawn again before
+    every step and every reading; noise is additive.  A direction without uncertainty is a zero column of L.
+    The covariance is updated in Joseph's form, and in UD form where S is nearly singular.
 
     Parameters
     ----------
-    alpha : α, spread of the points; on a rotation known to σ rad, γσ must stay well below π
-    beta : β, 2 is best for Gaussians
-    kappa : κ, secondary spread
+    alpha : α of "merwe", spread of the points; on a rotation known to σ rad, γσ must stay well below π
+    beta : β of "merwe", 2 is best for Gaussians
+    kappa : κ of "merwe" and "julier", secondary spread; below zero a covariance may come out indefinite
     keep : keep predictions and transitions (slopes of the regression), which smoothers need
+    points : "merwe" (2d + 1 points at ±γ along the columns of L, γ² = α² (d + κ)), "julier" (the same with
+        α = 1 and β = 0: Julier, Uhlmann 1997) or "simplex" (d + 1 points: Moireau, Chapelle 2011), which
+        takes none of α, β and κ
 
     Raises
     ------
     ModelError
-        where the points would not spread: α ≤ 0 or d + κ ≤ 0.
+        where there is no such set, or the points would not spread: α ≤ 0 or d + κ ≤ 0.
     """
 
     alpha: float = 1.0
     beta: float = 2.0
     kappa: float = 0.0
     keep: bool = False
-    name = "ukf"
+    points: str = "merwe"
+
+    def __post_init__(self) -> None:
+        if self.points == "cubature":
+            raise ModelError("cubature points are those of CubatureKalmanFilter()")
+        self.set()
+
+    @property
+    def name(self) -> str:
+        """`ukf`, with the set behind it where it is not the usual one."""
+        return "ukf" if self.points == "merwe" else f"ukf_{self.points}"
+
+    def set(self) -> SigmaSet:
+        """The set of points."""
+        return SigmaSet(self.points, self.alpha, self.beta, self.kappa)
 
     def weights(self, dim: int) -> NDArray[np.float64]:
         """[γ, weight of the central point in a mean, in a covariance, weight of any other] for d = `dim`."""
-        scale = self.alpha**2 * (dim + self.kappa)
-        if not (self.alpha > 0 and scale > 0 and math.isfinite(scale)):
-            raise ModelError(
-                f"UnscentedKalmanFilter(alpha={self.alpha}, kappa={self.kappa}) does not spread its points "
-                f"over {dim} directions: alpha must be positive and kappa above {-dim}"
-            )
-        central = 1.0 - dim / scale
-        return np.array([math.sqrt(scale), central, central + 1.0 - self.alpha**2 + self.beta, 0.5 / scale])
+        return self.set().weights(dim)
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        from sequential.kernels.records import Filtered
-        from sequential.kernels.unscented import filter_sigma_points
+        return filter_points(problem, self.name, self.set(), keep=self.keep)
 
-        whole = compiled(problem.model)
-        out = Filtered(*allocate(problem, whole.tables, keep=self.keep))
-        prior, weights = problem.model.prior, sealed(self.weights(whole.tables.d))
-        began = time.perf_counter()
-        log_likelihood, failed = filter_sigma_points(
-            whole.tables, problem.schedule, prior.mean, prior.cov, weights, int(self.keep), out
-        )
-        seconds = time.perf_counter() - began
-        whole.raise_failures()
-        require_solved(problem, failed, out)
-        require_finite(problem, out.mean)
-        rejected = int((out.accepted == 0).sum())
-        report = Report(self.name, seconds=seconds, message=whole.message(), rejected=rejected)
-        return as_run(problem, out, log_likelihood, report, keep=self.keep)
+
+@dataclass(frozen=True, slots=True)
+class CubatureKalmanFilter:
+    """The unscented filter without a central point and without a setting (Arasaratnam, Haykin 2009).
+
+    Its 2d points at ±√d along the columns of L integrate polynomials of degree three exactly, all with the
+    weight 1/2d, so that no covariance can come out indefinite.
+
+    Parameters
+    ----------
+    keep : keep predictions and transitions, which smoothers need
+    """
+
+    keep: bool = False
+    name = "ckf"
+
+    def solve(self, problem: Problem) -> Run:
+        """Filter the whole log."""
+        return filter_points(problem, self.name, SigmaSet("cubature"), keep=self.keep)
+
+
+def filter_points(problem: Problem, name: str, chosen: SigmaSet, *, keep: bool) -> Run:
+    """Run the compiled filter with a set of points and read its arrays."""
+    from sequential.kernels.records import Filtered
+    from sequential.kernels.unscented import filter_sigma_points
+
+    whole = compiled(problem.model)
+    out = Filtered(*allocate(problem, whole.tables, keep=keep))
+    prior, d = problem.model.prior, whole.tables.d
+    weights, unit = sealed(chosen.weights(d)), sealed(chosen.unit(d))
+    began = time.perf_counter()
+    log_likelihood, failed = filter_sigma_points(
+        whole.tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out
+    )
+    seconds = time.perf_counter() - began
+    whole.raise_failures()
+    require_solved(problem, failed, out)
+    require_finite(problem, out.mean)
+    rejected = int((out.accepted == 0).sum())
+    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
+    return as_run(problem, out, log_likelihood, report, keep=keep)
