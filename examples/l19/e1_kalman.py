@@ -21,10 +21,12 @@ class Kalman:
     """
 
     def __init__(self, F, B, H, Q, R, x0, P0):
+        x0 = np.ravel(x0)  # un vecteur colonne fait aussi l'affaire
+        self.rest = None if B is None else np.zeros(np.shape(B)[1])  # la commande nulle
         model = sq.StateSpace(
             manifold=sq.Vector(len(x0)),
             prior=sq.Gaussian(x0, P0),
-            process=sq.LinearProcess(F, Q, B),
+            process=sq.LinearProcess(np.atleast_2d(F), Q, B),
             sensors={"z": sq.LinearSensor(H, R)},
             input=None if B is None else "u",
         )
@@ -42,12 +44,12 @@ class Kalman:
         return self.belief.cov
 
     def predire(self, u=None):
-        """Avancer d'un pas, sous la commande u."""
-        self.belief = self.filter.predict(self.belief, 1.0, u)
+        """Avancer d'un pas, sous la commande u (nulle par défaut)."""
+        self.belief = self.filter.predict(self.belief, 1.0, self.rest if u is None else np.ravel(u))
 
     def corriger(self, z):
         """Tenir compte d'une mesure ; renvoie son NIS (innovation normalisée au carré, νᵀ S⁻¹ ν)."""
-        self.belief, innovation = self.filter.update(self.belief, "z", np.atleast_1d(z))
+        self.belief, innovation = self.filter.update(self.belief, "z", np.ravel(z))
         return innovation.nis
 
 

@@ -4,7 +4,7 @@
 F et H sont des jacobiennes.  Un cap de 359° mesuré quand on attend -1° n'est pas une innovation de 360°,
 mais de 0° : il faut replier l'innovation dans ]-π, π].  Ici il suffit de dire où vit la mesure :
 `manifold=SO2()` la replie, `Vector(1)` non, et tout le reste est identique.  Autres choix : UKF (sans
-jacobiennes), filtre particulaire.
+jacobiennes), filtre particulaire (sans gaussienne).
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ def robot(compass_manifold):
 
 
 def main():
-    from figures import BLUE, GREEN, ORANGE, READINGS, TRUTH, panels, save
+    from figures import BLUE, GREEN, ORANGE, PINK, READINGS, TRUTH, panels, save
 
     rng = np.random.default_rng(4)
     right, wrong = robot(sq.SO2()), robot(sq.Vector(1))
@@ -50,6 +50,7 @@ def main():
         "EKF, innovation repliée": sq.run(sq.ExtendedKalmanFilter(), right, drive.log, at=t),
         "EKF, innovation non repliée": sq.run(sq.ExtendedKalmanFilter(), wrong, drive.log, at=t),
         "UKF, innovation repliée": sq.run(sq.UnscentedKalmanFilter(), right, drive.log, at=t),
+        "filtre particulaire": sq.run(sq.ParticleFilter(1000, rng), right, drive.log, at=t),
     }
     rms, nis = {}, {}
     for name, run in runs.items():
@@ -64,7 +65,7 @@ def main():
     )
     gps = drive.log["gps"].values
     a.plot(gps[:, 0], gps[:, 1], label="GPS", **READINGS)
-    for (name, run), colour in zip(runs.items(), (GREEN, ORANGE, BLUE), strict=True):
+    for (name, run), colour in zip(runs.items(), (GREEN, ORANGE, BLUE, PINK), strict=True):
         a.plot(
             run.mean[:, 0],
             run.mean[:, 1],
@@ -83,12 +84,13 @@ def main():
     b.legend(loc="upper left")
     save(figure, "k3_ekf_robot")
 
-    good, bad, ukf = rms
+    good, bad, ukf, particles = rms
     assert rms[good] < 0.8, "l'EKF suit le robot"
     assert np.degrees(np.abs(naive.residual).max()) > 180, "359° pour -1°"
     assert rms[bad] > 2 * rms[good], "sans repli, le filtre explose"
     assert nis[bad] > 20 * nis[good]
     assert abs(rms[ukf] - rms[good]) < 0.1, "sur un modèle aussi doux, l'UKF fait jeu égal"
+    assert abs(rms[particles] - rms[good]) < 0.15, "et 1000 particules aussi, pour bien plus de calcul"
 
 
 if __name__ == "__main__":

@@ -72,6 +72,18 @@ def test_a_scalar_filter_without_control(e1):
     assert e1.nis_moyen(kf, [1.0, 1.0, 1.0]) == pytest.approx(0.0)
 
 
+def test_columns_and_no_command(e1, rng):
+    F, B, H = np.array([[1.0, 0.1], [0.0, 1.0]]), np.array([[0.005], [0.1]]), np.array([[1.0, 0.0]])
+    filters = [
+        e1.Kalman(F, B, H, 0.1 * np.eye(2), 0.3, x0, np.eye(2)) for x0 in (np.ones(2), np.ones((2, 1)))
+    ]
+    for z in rng.standard_normal(5):
+        filters[0].predire()
+        filters[1].predire(np.zeros((1, 1)))
+        assert filters[0].corriger(z) == filters[1].corriger(np.array([[z]]))
+    np.testing.assert_array_equal(filters[0].x, filters[1].x)
+
+
 def test_a_list_is_as_good_as_an_array(e2):
     assert e2.median_glissant([1, 9, 2, 3], 3).tolist() == [5.0, 2.0, 3.0, 2.5]
     assert e2.detecter_sauts([0, 0, 0, 5, 0, 0, 0], 5, 3.0).tolist() == [3]
