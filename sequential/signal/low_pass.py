@@ -100,6 +100,15 @@ class LowPass(SignalFilter):
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.where(np.asarray(dt) > 0, np.asarray(dt) / tau, 0.0))
 
+    def _elapsed_once(self, dt: float) -> float:
+        """The same for one interval, without NumPy's overhead."""
+        tau = self.tau
+        if tau is None:
+            return self._per_sample()
+        if dt <= 0.0:
+            return 0.0
+        return dt / tau if tau > 0.0 else math.inf
+
     def filtered(self, t: Array | None, x: Array) -> Array:
         """Filter the columns of x (N, m)."""
         if t is None:
@@ -132,9 +141,9 @@ class LowPass(SignalFilter):
             return state.y, state._replace(now=t)
         if math.isnan(state.y):
             return x, LowPassState(x, x, t, t)
-        q = self.elapsed(np.array([t - state.t]))
-        aim = x + float(lag(q)[0]) * (state.x - x) if self.between == "line" else x
-        y = state.y - math.expm1(-float(q[0])) * (aim - state.y)
+        q = self._elapsed_once(t - state.t)
+        aim = x + float(lag(np.asarray(q))) * (state.x - x) if self.between == "line" else x
+        y = state.y - math.expm1(-q) * (aim - state.y)
         return y, LowPassState(y, x, t, t)
 
     def response(self, interval: float | None = None) -> Response:
