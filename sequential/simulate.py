@@ -99,15 +99,25 @@ def _inputs(model: StateSpace, count: int, inputs: ArrayLike | None) -> Array:
 def _truth(model: StateSpace, stamps: Ints, driven: Array, rng: np.random.Generator) -> Array:
     f, manifold, prior = model.process_functions, model.manifold, model.prior
     x = manifold.retract(prior.mean, root(prior.cov) @ rng.standard_normal(manifold.dim))
-    path = [x]
+    path, known = [x], dict[float, Array]()
+    steady = model.process.linear and not getattr(model.process, "rows", 0)
     for k, dt in enumerate(np.diff(stamps) * 1e-9):
         ahead = evaluate(f.value, x, driven[k], float(dt), f.params, manifold.size)
-        cov = np.zeros((manifold.dim, manifold.dim))
-        if f.noise is not None:
-            cov = evaluate(f.noise, x, driven[k], float(dt), f.params, manifold.dim**2).reshape(cov.shape)
-        x = manifold.retract(ahead, root(cov) @ rng.standard_normal(manifold.dim))
+        # a linear process without a table has the same noise in steps of the same length
+        spread = known.get(float(dt)) if steady else None
+        if spread is None:
+            spread = known[float(dt)] = _spread(model, x, driven[k], float(dt))
+        x = manifold.retract(ahead, spread @ rng.standard_normal(manifold.dim))
         path.append(x)
     return np.stack(path)
+
+
+def _spread(model: StateSpace, x: Array, u: Array, dt: float) -> Array:
+    """A root of the process noise of one step (d, d)."""
+    f, d = model.process_functions, model.manifold.dim
+    if f.noise is None:
+        return np.zeros((d, d))
+    return root(evaluate(f.noise, x, u, dt, f.params, d * d).reshape(d, d))
 
 
 def _rows(given: ArrayLike | int, count: int) -> Ints:
