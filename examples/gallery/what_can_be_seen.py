@@ -1,7 +1,7 @@
-"""Before building a filter: can the sensors show the state, where would it settle, and would it be honest?
+"""Ask before a filter is built: can the sensors show the state, where will it settle, will it be honest.
 
-A drone holds its height with a barometer that drifts and an accelerometer-free model of its climb.  With the
-barometer alone, height and drift are one number; a sonar that reads now and then tells them apart.
+A drone keeps its height by a barometer that drifts.  To the barometer alone, height and drift are one number;
+a sonar that reads now and then tells them apart.
 """
 
 import numpy as np
@@ -9,9 +9,8 @@ import numpy as np
 import sequential as sq
 from sequential.evaluate import monte_carlo, observability
 
-STATE = sq.Product(
-    climb=sq.Vector(2), drift=sq.Vector(1)
-)  # height m and its rate m/s; what the barometer is off
+# height m and its rate m/s; what the barometer is off, m
+STATE = sq.Product(climb=sq.Vector(2), drift=sq.Vector(1))
 PROCESS = sq.Independent(climb=sq.ConstantVelocity(0.2), drift=sq.RandomWalk(0.01**2))
 PRIOR = sq.Gaussian([10.0, 0.0, 0.0], sq.diagonal([1.0, 0.5, 3.0]))
 BAROMETER = sq.LinearSensor([[1.0, 0.0, 1.0]], 0.4**2)
@@ -41,9 +40,8 @@ log = sq.simulate(both, TIMES, rng, readings={"sonar": 10}).log
 seen_both = observability(both, log)
 print(seen_both)
 settled = sq.steady_state(both, 0.1)
-print(
-    f"with both at 10 Hz it settles in {settled.settles:.0f} steps, σ = {np.sqrt(np.diag(settled.cov)).round(3)}"
-)
+sigmas = np.sqrt(np.diag(settled.cov)).round(3)
+print(f"with both at 10 Hz it settles in {settled.settles:.0f} steps to σ = {sigmas}")
 
 honest = monte_carlo(both, sq.KalmanFilter(), TIMES[::5], rng, runs=100, readings={"sonar": 2})
 print(honest)
