@@ -38,6 +38,7 @@ KERNELS = (
     "multiple_smoothing",
     "factored",
     "online_factored",
+    "online_sigma_points",
     "online_information",
     "information",
     "iterated",

@@ -37,6 +37,7 @@ INLINED = (
     "kernels/poses.py",
     "kernels/resampling.py",
     "kernels/sensing.py",
+    "kernels/unscented.py",
     "kernels/sigma_points.py",
 )
 

@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 
 from sequential.compile import Compiled, compiled
 from sequential.errors import ModelError
-from sequential.filters import ExtendedKalmanFilter, IteratedExtendedKalmanFilter, KalmanFilter
+from sequential.filters import (
+    CubatureKalmanFilter,
+    ExtendedKalmanFilter,
+    IteratedExtendedKalmanFilter,
+    KalmanFilter,
+    UnscentedKalmanFilter,
+)
 from sequential.filters.kalman import require_linear
+from sequential.filters.sigma_sets import SigmaSet
 from sequential.model import StateSpace
 from sequential.online.belief import Layout
-from sequential.timeline import Schedule
+from sequential.timeline import Schedule, sealed
 
 __all__ = ["Handle", "handle"]
 
@@ -134,6 +141,25 @@ def _(estimator: ExtendedKalmanFilter, model: StateSpace) -> Lowered:
 @lowered.register
 def _(estimator: IteratedExtendedKalmanFilter, model: StateSpace) -> Lowered:
     return extended(model, estimator.form, max(estimator.max_iterations, 2))
+
+
+@lowered.register
+def _(estimator: UnscentedKalmanFilter, model: StateSpace) -> Lowered:
+    return sigma_points(model, estimator.set())
+
+
+@lowered.register
+def _(estimator: CubatureKalmanFilter, model: StateSpace) -> Lowered:
+    return sigma_points(model, SigmaSet("cubature"))
+
+
+def sigma_points(model: StateSpace, chosen: SigmaSet) -> Lowered:
+    """A filter that carries a set of points through the models."""
+    from sequential.kernels.online_sigma_points import sigma_points_step
+
+    n, d = model.manifold.size, model.manifold.dim
+    settings = (sealed(chosen.weights(d)), sealed(chosen.unit(d)))
+    return Lowered(sigma_points_step, (np.zeros(n), np.zeros((d, d))), settings)
 
 
 def extended(model: StateSpace, form: str, iterations: int) -> Lowered:

@@ -143,11 +143,11 @@ class Replay:
         if event.port is not None and stamp < self._start:
             self._tally.early[name] += 1
             return Estimate(stamp, self._now, None, late, name, used=False)
-        self._tally.used += 1
-        self._tally.late += late
         if self._driving is not None and event.port is not None:
             self._driving.require_soon(self._began, self._newest, self._delay)
         self._insert(event)
+        self._tally.used += 1
+        self._tally.late += late
         self._forget(self._newest)
         return Estimate(stamp, self._now, event.innovation, late, name, used=True)
 
@@ -161,14 +161,17 @@ class Replay:
             if not np.isfinite(given).all():
                 msg = f"{name!r} drives the process and is {given} at {t * 1e-9:.6f} s; leave that out"
                 raise NotFiniteError(msg)
-            return _Event(t, INPUT, self._serial, None, given)
+            return _Event(t, INPUT, self._serial, None, given.copy())
         port = self._ports.get(name)
         if port is None:
             raise unknown_sensor(self._model, name)
-        z = port.values(values)
+        z, known = port.values(values).copy(), port.known(context).copy()  # kept, so they must not change
+        if np.isinf(z).any() or not np.isfinite(known).all():
+            msg = f"a reading of {name!r} at {t * 1e-9:.6f} s is {z}; it must be finite, or NaN where missing"
+            raise NotFiniteError(msg)
         self._tally.missing += bool(np.isnan(z).all())
         noise = None if noise_cov is None else port.noise(noise_cov)
-        return _Event(t, port.index, self._serial, port, z, port.known(context), noise)
+        return _Event(t, port.index, self._serial, port, z, known, noise)
 
     def _open(self, t: int) -> None:
         """Place the prior at the first event in time, where the model does not say when it holds."""
@@ -178,17 +181,24 @@ class Replay:
             self._replay(0)
 
     def _insert(self, event: _Event) -> None:
-        """Put an event in its place and do again what it changes."""
+        """Put an event in its place and do again what it changes; out of it again where that fails."""
         first = len(self._events)
         if event.port is None and self._driving is not None:
             changed = self._driving.add(event.t, event.z)
             first = bisect_right(self._events, changed, key=_stamp)
-        if event.t >= self._start:
-            at = bisect_left(self._events, event)
-            self._events.insert(at, event)
-            first = min(first, at)
-        self._tally.replayed += max(len(self._events) - first - 1, 0)
-        self._replay(first)
+        if event.t < self._start:
+            self._replay(first)
+            return
+        at = bisect_left(self._events, event)
+        self._events.insert(at, event)
+        first = min(first, at)
+        try:
+            self._replay(first)
+        except Exception:
+            del self._events[at]
+            self._replay(first)
+            raise
+        self._tally.replayed += len(self._events) - first - 1
 
     def _replay(self, first: int) -> None:
         """Estimate every event from one on."""

@@ -17,6 +17,9 @@ FILTERS = [
     sq.ExtendedKalmanFilter(form="sqrt"),
     sq.IteratedExtendedKalmanFilter(form="ud"),
     sq.ExtendedKalmanFilter(form="information"),
+    sq.UnscentedKalmanFilter(),
+    sq.UnscentedKalmanFilter(points="simplex"),
+    sq.CubatureKalmanFilter(),
 ]
 every_filter = pytest.mark.parametrize("estimator", FILTERS, ids=lambda e: e.name)
 every_world = pytest.mark.parametrize("world", worlds.EVERY_WORLD, ids=repr)

@@ -205,6 +205,38 @@ def test_an_event_that_does_not_fit_is_a_sentence(events, settings, sentence):
         feed(events, **settings)
 
 
+def test_a_buffer_may_be_used_again():
+    """Drivers write every reading to one place."""
+    replay, buffer = sq.Replay(sq.KalmanFilter(), cart(), max_delay=1.0), np.zeros(1)
+    for t, value in ((0.1, 0.2), (0.3, 0.5), (0.2, 0.3)):
+        buffer[0] = value
+        replay.push(t, "position", buffer)
+    made, _ = feed([(0.1, "position", 0.2), (0.2, "position", 0.3), (0.3, "position", 0.5)])
+    np.testing.assert_array_equal(replay.belief.mean, made[-1].belief.mean)
+
+
+def test_an_event_that_fails_is_as_if_it_had_not_come():
+    def observe(x):
+        if eval("x[0] > 1e3"):  # noqa: S307 - so that it runs in Python
+            raise OverflowError("out of range")
+        return x[:1]
+
+    sensors = {"far": sq.LinearSensor([[1.0, 0.0]], 0.25), "near": sq.Sensor(observe, 0.25)}
+    model = cart()
+    model = sq.StateSpace(model.manifold, model.prior, model.process, sensors, start=0.0, check=False)
+    replay = sq.Replay(sq.ExtendedKalmanFilter(), model, max_delay=9.0)
+    replay.push(1.0, "near", 1.0)
+    belief = replay.push(5.0, "far", 1e6).belief
+    with pytest.raises(OverflowError, match="out of range"):
+        replay.push(6.0, "near", 1.0)
+    with pytest.raises(FactorlabError, match="it must be finite"):
+        replay.push(6.0, "far", math.inf)
+    assert replay.belief.t == belief.t
+    np.testing.assert_array_equal(replay.belief.mean, belief.mean)
+    assert replay.summary.used == 2
+    assert replay.push(6.0, "far", 1e6).used
+
+
 def pushed(events, **settings):
     replay = sq.Replay(sq.ExtendedKalmanFilter(), worlds.unicycle_range_bearing().model, **settings)
     for event in events:
