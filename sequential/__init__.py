@@ -58,7 +58,7 @@ from sequential.online import Arrivals, Belief, Innovation, Online, Replay, arri
 from sequential.run import Estimator, run
 from sequential.signal import Complementary, Hampel, LowPass, MovingMean, SlidingMedian
 from sequential.simulate import Simulation, simulate
-from sequential.smoothers import FixedLagSmoother, IteratedSmoother, RauchTungStriebel
+from sequential.smoothers import BackwardSimulation, FixedLagSmoother, IteratedSmoother, RauchTungStriebel
 from sequential.steady_state import SteadyState, alpha_beta, steady_state
 from sequential.timeline import Problem, prepare
 from sequential.tuning import (
@@ -76,6 +76,7 @@ __all__ = [
     "SO2",
     "SO3",
     "Arrivals",
+    "BackwardSimulation",
     "Belief",
     "Complementary",
     "ConstantAcceleration",

@@ -44,6 +44,7 @@ KERNELS = (
     "iterated",
     "linearize",
     "particles",
+    "backward_simulation",
     "smoothing",
     "scripted",
     "looking",

@@ -1,4 +1,4 @@
-"""Moments of a mixture of Gaussians on a product manifold.
+"""Moments of mixtures, of Gaussians and of particles, on a product manifold.
 
 States are compared in the tangent at the likeliest member, so that no angle and no quaternion is ever
 averaged, and each covariance is carried to the tangent at the mean before it is added.
@@ -9,11 +9,11 @@ from __future__ import annotations
 from numba import types
 
 from sequential.kernels.arrays import f1, f2, f3, i0, i2, w1, w2
-from sequential.kernels.call import bare_as
+from sequential.kernels.call import bare, bare_as
 from sequential.kernels.charts import local, retract, transport
 from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, push_covariance
 
-__all__ = ["largest", "mix", "normalise"]
+__all__ = ["largest", "mix", "moments_of", "normalise"]
 
 PASSES = 10  # over a mean on a manifold; the second finds a flat one settled
 SETTLED = 1e-12
@@ -79,3 +79,38 @@ def mix(table, weights, means, covs, mean, cov, e, move, turn, inverse, part, fl
         for a in range(d):
             for b in range(d):
                 cov[a, b] += weights[j] * (turn[a, b] + e[a] * e[b])
+
+
+@bare
+def moments_of(table, first, last, size, dim, points, weights, mean, cov, e, move):
+    """Mean (size,) about the heaviest of the points (P, size or wider), covariance (dim, dim) there."""
+    flat, width, count = points.reshape(-1), points.shape[1], len(weights)
+    best = largest(weights)
+    for i in range(size):
+        mean[i] = points[best, i]
+    for _ in range(PASSES):
+        for k in range(dim):
+            move[k] = 0.0
+        for i in range(count):
+            if weights[i] > 0.0:
+                local(table, first, last, mean, 0, flat, i * width, e, 0)
+                for k in range(dim):
+                    move[k] += weights[i] * e[k]
+        furthest = 0.0
+        for k in range(dim):
+            furthest = max(furthest, abs(move[k]))
+        retract(table, first, last, mean, 0, move, 0, mean, 0)
+        if not furthest > SETTLED:
+            break
+    for a in range(dim):
+        for b in range(dim):
+            cov[a, b] = 0.0
+    for i in range(count):
+        if weights[i] > 0.0:
+            local(table, first, last, mean, 0, flat, i * width, e, 0)
+            for a in range(dim):
+                for b in range(a + 1):
+                    cov[a, b] += weights[i] * e[a] * e[b]
+    for a in range(dim):
+        for b in range(a):
+            cov[b, a] = cov[a, b]

@@ -17,14 +17,12 @@ from sequential.kernels.belief import LOG_TWO_PI
 from sequential.kernels.call import bare, bare_as, call
 from sequential.kernels.charts import local, retract
 from sequential.kernels.matrices import cholesky, copy_matrix, copy_vector, fill_diagonal
-from sequential.kernels.mixing import largest, normalise
+from sequential.kernels.mixing import moments_of, normalise
 from sequential.kernels.records import MODEL, SCHEDULE
 from sequential.kernels.resampling import resample
 
 __all__ = ["CLOUD", "Cloud", "follow"]
 
-PASSES = 10  # over a mean on a manifold
-SETTLED = 1e-9
 HUBER = 1
 
 
@@ -55,41 +53,6 @@ def heavy_tail(kind, k, squared):
         r = math.sqrt(squared)
         return 0.5 * squared if r <= k else k * (r - 0.5 * k)
     return 0.5 * k * k * math.log1p(squared / (k * k))
-
-
-@bare
-def moments_of(table, first, last, size, dim, points, weights, mean, cov, e, move):
-    """Mean (size,) about the heaviest of the points (P, size or wider), covariance (dim, dim) there."""
-    flat, width, count = points.reshape(-1), points.shape[1], len(weights)
-    best = largest(weights)
-    for i in range(size):
-        mean[i] = points[best, i]
-    for _ in range(PASSES):
-        for k in range(dim):
-            move[k] = 0.0
-        for i in range(count):
-            if weights[i] > 0.0:
-                local(table, first, last, mean, 0, flat, i * width, e, 0)
-                for k in range(dim):
-                    move[k] += weights[i] * e[k]
-        furthest = 0.0
-        for k in range(dim):
-            furthest = max(furthest, abs(move[k]))
-        retract(table, first, last, mean, 0, move, 0, mean, 0)
-        if not furthest > SETTLED:
-            break
-    for a in range(dim):
-        for b in range(dim):
-            cov[a, b] = 0.0
-    for i in range(count):
-        if weights[i] > 0.0:
-            local(table, first, last, mean, 0, flat, i * width, e, 0)
-            for a in range(dim):
-                for b in range(a + 1):
-                    cov[a, b] += weights[i] * e[a] * e[b]
-    for a in range(dim):
-        for b in range(a):
-            cov[b, a] = cov[a, b]
 
 
 @bare

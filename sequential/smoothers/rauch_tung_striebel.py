@@ -44,8 +44,8 @@ class RauchTungStriebel:
 
         if isinstance(self.filter, ParticleFilter):
             raise ModelError(
-                "particles keep no Gaussian prediction to smooth backwards from; give RauchTungStriebel an "
-                "ExtendedKalmanFilter or an UnscentedKalmanFilter"
+                "particles keep no Gaussian prediction to smooth backwards from; take "
+                "BackwardSimulation(ParticleFilter(…)), which draws whole trajectories"
             )
         if isinstance(self.filter, InteractingMultipleModel):
             return smooth_multiple(self.filter, problem, self.name)
