@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sequential.errors import ShapeError
+from sequential.errors import NotPositiveDefiniteError, ShapeError
 
 __all__ = ["Control", "Covariance", "Matrix", "State", "as_covariance", "as_reading", "nothing_read"]
 
 Array = NDArray[Any]
+
+ROUNDING = 1e-6  # how far from a covariance, in units of its own variances, a matrix may be by rounding
 
 
 class State:
@@ -45,7 +47,9 @@ class Covariance:
         self.name = name
 
     def __set__(self, filter_: Any, value: ArrayLike) -> None:
-        filter_.__dict__[self.name] = as_covariance(value, getattr(filter_, self.dim), self.name)
+        given = as_covariance(value, getattr(filter_, self.dim), self.name)
+        require_semidefinite(given, self.name)
+        filter_.__dict__[self.name] = given
 
 
 class Matrix:
@@ -103,6 +107,24 @@ def as_covariance(value: ArrayLike, dim: int, name: str) -> Array:
         msg = f"{name} has shape {given.shape}; it is ({dim}, {dim}), a diagonal ({dim},) or one number"
         raise ShapeError(msg)
     return np.ascontiguousarray(given)
+
+
+def require_semidefinite(given: Array, name: str) -> None:
+    """Raise `NotPositiveDefiniteError` where a matrix is no covariance, beyond what rounding does to one."""
+    spread = float(np.abs(given).max(initial=0.0))
+    if np.abs(given - given.T).max(initial=0.0) > ROUNDING * spread:
+        msg = f"{name} is not symmetric: largest difference {np.abs(given - given.T).max():.3g}"
+        raise NotPositiveDefiniteError(msg)
+    try:
+        np.linalg.cholesky(given)
+    except np.linalg.LinAlgError:
+        sigma = np.sqrt(np.abs(np.diagonal(given)))
+        scale = np.where(sigma > 0.0, sigma, 1.0)
+        lowest = float(np.linalg.eigvalsh(given / np.outer(scale, scale)).min())
+        if lowest < -ROUNDING:
+            lowest = float(np.linalg.eigvalsh(given).min())
+            msg = f"{name} is not positive semi-definite: smallest eigenvalue {lowest:.3g}"
+            raise NotPositiveDefiniteError(msg) from None
 
 
 def as_reading(z: Any, dim: int, ndim: int) -> Array:

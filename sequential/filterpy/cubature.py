@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sequential.filterpy.attributes import Covariance, State, as_covariance, as_reading
 from sequential.filterpy.bierman import root
 from sequential.filterpy.extended import as_tuple
+from sequential.filterpy.linear_update import tidy
 from sequential.filterpy.recursion import Recursion
 from sequential.filterpy.sigma_points import moments, residuals, sigma_update, through
 
@@ -45,7 +46,7 @@ class FilterpyCubature(Recursion):
         dt = self._dt if dt is None else dt
         self.sigmas_f = through(lambda point: self.fx(point, dt, *as_tuple(fx_args)), self._draw())
         mean, dx = moments(self.sigmas_f, self._weights(), self.x_mean, self.residual_x)
-        self.x, self.P = mean[:, None], dx.T @ dx / len(dx) + self.Q
+        self._own(x=mean[:, None], P=tidy(dx.T @ dx / len(dx) + self.Q))
         self._keep("prior")
 
     def update(self, z: Any, R: Any = None, hx_args: Any = ()) -> None:
@@ -63,7 +64,8 @@ class FilterpyCubature(Recursion):
             innovation[missing], dz[:, missing] = 0.0, 0.0
             R = np.where(missing | missing[:, None], np.diag(missing.astype(float)), R)
         dx = residuals(drawn, np.ravel(self.x), self.residual_x)
-        self.K, self.S, self.SI, self.P = sigma_update(self.P, dx, (dz, self.sigmas_h), self._weights(), R)
+        update = sigma_update(self.P, dx, (dz, self.sigmas_h), self._weights(), R)
+        self._own(**update._asdict())
         self.y = innovation[:, None]
         self.x = self.x + (self.K @ innovation).reshape(self.x.shape)
         self._after_update(z, int(missing.sum()))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.filterpy.attributes import Control, Covariance, Matrix, State, as_covariance, as_reading
-from sequential.filterpy.linear_update import linear_update
+from sequential.filterpy.linear_update import linear_update, tidy
 from sequential.filterpy.recursion import Recursion, columns, without_missing
 
 __all__ = ["FilterpyExtended"]
@@ -39,7 +39,7 @@ class FilterpyExtended(Recursion):
     def predict(self, u: Any = 0) -> None:
         """One step ahead: `predict_x`, then F P Fᵀ + Q."""
         self.predict_x(u)
-        self.P = self.F @ self.P @ self.F.T + self.Q
+        self._own(P=tidy(self.F @ self.P @ self.F.T + self.Q))
         self._keep("prior")
 
     def update(
@@ -72,7 +72,7 @@ class FilterpyExtended(Recursion):
         missing = np.isnan(given.ravel())
         if missing.any():
             self.y, H, R = without_missing(missing, self.y, H, R)
-        self.K, self.S, self.SI, self.P = linear_update(self.P, H, R)
+        self._own(**linear_update(self.P, H, R)._asdict())
         self.x = self.x + self.K @ self.y
         self._after_update(z if np.ndim(z) else given, int(missing.sum()))
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.filterpy.attributes import Control, Covariance, Matrix, State, as_reading
-from sequential.filterpy.linear_update import linear_update
+from sequential.filterpy.linear_update import linear_update, tidy
 from sequential.filterpy.recursion import Recursion, columns, without_missing
 
 __all__ = ["FilterpyFixedLag"]
@@ -59,7 +59,7 @@ class FilterpyFixedLag(Recursion):
 
     def _step(self, z: Any, u: Any, lag: int) -> None:
         before = self.F @ self.x + columns(self.B, u, self.x)
-        P = self.F @ self.P @ self.F.T + self.Q
+        P = tidy(self.F @ self.P @ self.F.T + self.Q)
         window = [cross @ self.F.T for cross in self._cross[-(lag - 1) :]] if lag > 1 else []
         window.append(P)
         reading = np.full(self.dim_z, np.nan) if z is None else z
@@ -68,8 +68,8 @@ class FilterpyFixedLag(Recursion):
         y, H, R = reading - self.H @ before, self.H, self.R
         if missing.any():
             y, H, R = without_missing(missing, y, H, R)
-        K, self.S, SI, self.P = linear_update(P, H, R)
-        self.K, self.y = K, y
+        K, S, SI, after = linear_update(P, H, R)
+        self._own(K=K, S=S, SI=SI, P=after, y=y)
         moved = H.T @ (SI @ y)
         self.xSmooth = [*self.xSmooth, before]
         first = len(self.xSmooth) - len(window)
@@ -80,4 +80,3 @@ class FilterpyFixedLag(Recursion):
         self.x = before + K @ y
         self.x_s = self.xSmooth[first]
         self._missing, self._log_likelihood = int(missing.sum()), None if not missing.all() else 0.0
-        self.SI = SI

@@ -94,7 +94,7 @@ class FilterpyKalman(LinearRecursion):
         reading, self.y, H, R, missing = seen
         if M is not None and missing.any():
             M = np.where(missing, 0.0, M)
-        self.K, self.S, self.SI, self.P = self._judge(H, R, M)
+        self._own(**self._judge(H, R, M)._asdict())
         self.x = self.x + self.K @ self.y
         self._after_update(reading if reshaped else z, int(missing.sum()))
 
@@ -155,7 +155,8 @@ class FilterpyKalman(LinearRecursion):
         y, H, R = without_missing(missing, reading - H @ self.x, H, R)
         update = self._judge(H, R)
         self.y, self.K, self.z = self.y.copy(), self.K.copy(), copy.copy(self.z)
-        self.y[rows], self.K[:, rows], self.P = y.reshape(self.y[rows].shape), update.K, update.P
+        self.y[rows], self.K[:, rows] = y.reshape(self.y[rows].shape), update.K
+        self._own(P=update.P)
         self.z[rows] = np.reshape(reading, self.z[rows].shape)
         self.x = self.x + update.K @ y
         self._keep("post")

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from sequential.filterpy.bierman import ud_factor, ud_update
 
-__all__ = ["Update", "correlated_update", "joseph", "linear_update", "log_density", "pseudo_inverse"]
+__all__ = ["Update", "correlated_update", "joseph", "linear_update", "log_density", "pseudo_inverse", "tidy"]
 
 Array = NDArray[Any]
 Inverse = Callable[[Any], Any]
 
-# A pivot of S below this share of its diagonal: Joseph's form loses digits in proportion to the inverse.
-DOUBT = 1e-9
+# A pivot of S below this share of its diagonal: Joseph's form loses digits in proportion to the inverse, and
+# a covariance that is a little indefinite grows worse from step to step.
+DOUBT = 1e-4
 LOG_2PI = math.log(2.0 * math.pi)
 
 
@@ -56,10 +57,20 @@ def joseph(P: Array, H: Array, R: Array, K: Array) -> Array:
     """(I - K H) P (I - K H)ᵀ + K R Kᵀ, symmetric to the last bit."""
     left = -(K @ H)
     left.flat[:: len(P) + 1] += 1.0
-    after: Array = left @ P @ left.T + K @ R @ K.T
-    after += after.T
-    after *= 0.5
-    return after
+    return tidy(left @ P @ left.T + K @ R @ K.T)
+
+
+def tidy(P: Array) -> Array:
+    """A covariance made symmetric.
+
+    A variance below zero is what rounding left of larger ones: it becomes zero, and so do its covariances.
+    """
+    P = 0.5 * (P + P.T)
+    variances = np.diagonal(P)
+    if variances.min() < 0.0:
+        gone = variances < 0.0
+        P[gone], P[:, gone] = 0.0, 0.0
+    return P
 
 
 def correlated_update(P: Array, H: Array, R: Array, M: Array, inv: Inverse = np.linalg.inv) -> Update:
@@ -79,8 +90,7 @@ def correlated_update(P: Array, H: Array, R: Array, M: Array, inv: Inverse = np.
     SI = inv(S)
     K = cross[:n] @ SI
     left = np.hstack([np.eye(n) - K @ H, -K])
-    after = left @ joint @ left.T
-    return Update(K, S, SI, 0.5 * (after + after.T))
+    return Update(K, S, SI, tidy(left @ joint @ left.T))
 
 
 def in_doubt(S: Array, R: Array) -> bool:

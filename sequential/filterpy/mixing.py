@@ -48,7 +48,8 @@ class FilterpyMixing(TakenOver):
         states = [np.ravel(f.x) for f in self.filters]
         mixed = [self._mixture(states, weights) for weights in self.omega.T]
         for f, (x, P) in zip(self.filters, mixed, strict=True):
-            f.x, f.P = x.reshape(self.x.shape), P
+            f.x = x.reshape(self.x.shape)
+            f.P = P
             f.predict(u)
         self._compute_state_estimate()
         self._keep("prior")

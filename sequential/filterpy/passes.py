@@ -112,7 +112,7 @@ def _compiled_steps(
         P,
         *shaped,
     )
-    filter_.x, filter_.P = x.reshape(filter_.x.shape), P
+    vars(filter_).update(x=x.reshape(filter_.x.shape), P=P)
     return int(stopped)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.filterpy.bierman import EPS, root, ud_factor
-from sequential.filterpy.linear_update import DOUBT, Update, in_doubt, linear_update
+from sequential.filterpy.linear_update import DOUBT, Update, in_doubt, linear_update, tidy
 
 __all__ = ["Moments", "moments", "residuals", "settled", "sigma_covariance", "sigma_update", "sturdy_points"]
 
@@ -89,11 +89,11 @@ def sigma_covariance(P: Array, dx: Array, df: Array, weights: Array, noise: Arra
     residuals dx (k, n) of covariance P, plus what is left in the directions where that is positive.
     """
     cov = df.T @ (weights[:, None] * df) + noise
-    cov = np.asarray(0.5 * (cov + cov.T))
+    cov = tidy(cov)
     if weights.min() >= 0.0 or is_definite(cov):
         return cov
     _, explained, rest = regression(P, dx, df, weights)
-    return explained + rest + noise
+    return tidy(explained + rest + noise)
 
 
 def sigma_update(
@@ -110,7 +110,8 @@ def sigma_update(
     S = dz.T @ weighted + R
     S = 0.5 * (S + S.T)
     Pxz = dx.T @ weighted
-    if inv is np.linalg.inv and in_doubt(S, R):
+    doubtful = inv is np.linalg.inv and in_doubt(S, R)
+    if doubtful:
         # below this, a variance is the rounding of the points themselves
         floor = (16 * EPS * np.abs(points).max(axis=0)) ** 2 * np.abs(weights).sum()
         inverse = inverse_above(S, floor)
@@ -119,7 +120,8 @@ def sigma_update(
     if inverse is not None:
         K = Pxz @ inverse
         left = dx - dz @ K.T
-        after = settled(left.T @ (weights[:, None] * left) + K @ R @ K.T, P, weights)
+        after = left.T @ (weights[:, None] * left) + K @ R @ K.T
+        after = settled(after, P, weights, trusted=not doubtful and weights.min() >= 0.0)
         if after is not None:
             return Update(K, S, inverse, after)
     H, _, rest = regression(P, dx, dz, weights)
@@ -152,10 +154,13 @@ def inverse_above(S: Array, floor: Array) -> Array | None:
     return np.asarray(half @ half.T)
 
 
-def settled(cov: Array, before: Array, weights: Array) -> Array | None:
-    """A covariance made symmetric and without negative rounding; None where it is negative beyond that."""
-    cov = 0.5 * (cov + cov.T)
-    if weights.min() >= 0.0 or is_definite(cov):
+def settled(cov: Array, before: Array, weights: Array, *, trusted: bool = False) -> Array | None:
+    """A covariance made symmetric and without negative rounding; None where it is negative beyond that.
+
+    Rounding is measured by the variances `before`.  A `trusted` covariance is a sum of squares already.
+    """
+    cov = tidy(cov)
+    if trusted or is_definite(cov):
         return cov
     sigma = np.sqrt(np.maximum(np.diagonal(before), 0.0))
     scale = np.divide(1.0, sigma, out=np.zeros_like(sigma), where=sigma > 0.0)

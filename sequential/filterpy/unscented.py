@@ -73,12 +73,12 @@ class FilterpyUnscented(Recursion):
         """One step ahead of `dt` seconds through `fx(x, dt, **fx_args)`."""
         self.compute_process_sigmas(self._dt if dt is None else dt, fx, **fx_args)
         if UT is not None:
-            self.x, self.P = UT(self.sigmas_f, self.Wm, self.Wc, self.Q, self.x_mean, self.residual_x)
+            x, P = UT(self.sigmas_f, self.Wm, self.Wc, self.Q, self.x_mean, self.residual_x)
+            self._own(x=x, P=P)
         else:
             mean, df = moments(self.sigmas_f, self.Wm, self.x_mean, self.residual_x, self.state_add)
             dx = residuals(self._points, self.x, self.residual_x)
-            self.P = sigma_covariance(self.P, dx, df, self.Wc, self.Q)
-            self.x = mean
+            self._own(x=mean, P=sigma_covariance(self.P, dx, df, self.Wc, self.Q))
         self._redraw()
         self._keep("prior")
 
@@ -124,7 +124,7 @@ class FilterpyUnscented(Recursion):
     def _correct(self, dz: Array, R: Array) -> None:
         dx = residuals(self.sigmas_f, self.x, self.residual_x)
         seen = dz, self.sigmas_h
-        self.K, self.S, self.SI, self.P = sigma_update(self.P, dx, seen, self.Wc, R, self.inv)
+        self._own(**sigma_update(self.P, dx, seen, self.Wc, R, self.inv)._asdict())
         self.x = self.state_add(self.x, self.K @ self.y)
 
     def cross_variance(self, x: Any, z: Any, sigmas_f: Array, sigmas_h: Array) -> Array:

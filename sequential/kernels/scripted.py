@@ -24,8 +24,19 @@ from sequential.kernels.matrices import (
 
 __all__ = ["filter_script", "predict_step", "smooth_script", "update_step"]
 
-DOUBT = 1e-9  # a pivot of S below this share of its diagonal leaves Joseph's form too few digits
+DOUBT = 1e-4  # a pivot of S below this share of its diagonal costs Joseph's form digits
 SINGULAR = 1e-12  # the same of a predicted covariance, whose gain then is a pseudo-inverse's
+
+
+@bare_as(types.void(w2))
+def clear_negative(p):
+    """A variance below zero is what rounding left of larger ones: it is zero, and so are its covariances."""
+    n = len(p)
+    for i in range(n):
+        if p[i, i] < 0.0:
+            for j in range(n):
+                p[i, j] = 0.0
+                p[j, i] = 0.0
 
 
 @bare_as(types.void(f2, f2, f2, f1, f1, f0, w2, w1, w2))
@@ -41,6 +52,7 @@ def carry(f, p, q, x, push, fading, work, x_out, p_out):
         x_out[i] = total
         for j in range(n):
             p_out[i, j] = fading * p_out[i, j] + q[i, j]
+    clear_negative(p_out)
 
 
 @bare_as(types.void(f2, f2, f2, f2, w2, w2, w2))
@@ -52,6 +64,7 @@ def join(left, p, k, r, lp, kr, p_out):
     multiply(k, r, kr, n, m, m)
     add_product_nt(kr, k, p_out, n, m, n)
     symmetrise(p_out, n)
+    clear_negative(p_out)
 
 
 @bare_as(i0(f2, f2, f2, f1, f1, w1, w2, w2, w2, w1, w2, w2, w2, w2, w2))

@@ -267,10 +267,12 @@ def test_a_smoother_of_noise_of_low_rank(same, rng):
 
 def test_what_is_not_a_covariance_is_refused():
     ours = sq.from_filterpy(tracker(False, 2))
-    ours.P[0, 0] = -1.0
-    ours.R = 0.0
-    with pytest.raises(sq.FactorlabError, match="P is not positive semi-definite: smallest eigenvalue -1"):
-        ours.update([1.0, 1.0])
+    with pytest.raises(sq.FactorlabError, match="P is not positive semi-definite: smallest eigenvalue -2"):
+        ours.P = [3.0, -2.0, 1.0, 1.0]
+    with pytest.raises(sq.FactorlabError, match="Q is not positive semi-definite: smallest eigenvalue -1"):
+        ours.Q = [[1.0, 2, 0, 0], [2.0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    with pytest.raises(sq.FactorlabError, match="R is not symmetric"):
+        ours.R = [[1.0, 0.5], [0.2, 1.0]]
     ours = sq.from_filterpy(tracker(False, 2))
     ours.P[0, 0] = np.nan
     with pytest.raises(sq.FactorlabError, match="P holds NaN"):
