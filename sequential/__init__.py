@@ -64,6 +64,7 @@ from sequential.timeline import Problem, prepare
 from sequential.tuning import (
     Knob,
     Tuning,
+    autocovariance_least_squares,
     expectation_maximization,
     noise_from_still,
     tune,
@@ -139,6 +140,7 @@ __all__ = [
     "Vector",
     "alpha_beta",
     "arrivals",
+    "autocovariance_least_squares",
     "diagonal",
     "expectation_maximization",
     "from_filterpy",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["tune"]
 
-METHODS = ("ml", "nis", "em", "still")  # the same as factorlab.tuning.METHODS, which costs an import
+METHODS = ("ml", "nis", "em", "als", "still")  # the same as factorlab.tuning.METHODS, which costs an import
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Settings:
     default="ml",
     show_default=True,
     help="ml: likelihood of the innovations; nis: process noise until the NIS is as expected; em: whole "
-    "covariances; still: a sensor at rest.",
+    "covariances; als: from autocovariances, linear models; still: a sensor at rest.",
 )
 @click.option(
     "--model",
@@ -104,7 +104,7 @@ class Settings:
 def tune(**options: Any) -> int:
     """Fit the noise of a model to a log, or take a sensor's noise from a recording at rest.
 
-    DATASET is kitti, plaza1, plaza2 or mrclam; LOG is a CSV or NPZ file with named streams, together
+    DATASET is kitti, plaza1, plaza2, mrclam or rail; LOG is a CSV or NPZ file with named streams, together
     with --model (not needed for --method still).  Held-out readings and truth are not looked at.
     """
     return tune_and_show(Settings(**options))

@@ -20,6 +20,7 @@ from sequential.log import SensorLog
 from sequential.tuning import (
     Knob,
     Tuning,
+    autocovariance_least_squares,
     expectation_maximization,
     noise_from_still,
     tune,
@@ -28,7 +29,7 @@ from sequential.tuning import (
 
 __all__ = ["METHODS", "Fitted", "UnknownKnobError", "tune_dataset", "tune_still"]
 
-METHODS = ("ml", "nis", "em", "still")
+METHODS = ("ml", "nis", "em", "als", "still")
 
 
 class UnknownKnobError(ModelError):
@@ -65,7 +66,7 @@ def tune_dataset(
 
     Parameters
     ----------
-    method : "ml", "nis" or "em"
+    method : "ml", "nis", "em" or "als"
     asked : knobs to turn, with another initial value or None; by default all ("ml"), or those of the process
         noise, by one factor ("nis")
     profile : intervals from the profile likelihood ("ml")
@@ -77,6 +78,8 @@ def tune_dataset(
     """
     if method == "em":
         found = expectation_maximization(dataset.model, dataset.log, max_gap=max_gap)
+    elif method == "als":
+        found = autocovariance_least_squares(dataset.model, dataset.log, max_gap=max_gap)
     else:
         found = _over_knobs(dataset, method, asked or {}, profile=profile, max_gap=max_gap, seed=seed)
     findings = findings_of(dataset, found, max_gap)

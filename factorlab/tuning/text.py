@@ -19,6 +19,7 @@ METHOD = {
     "ml": "maximum likelihood of the innovations",
     "nis": "process noise by the NIS",
     "em": "expectation-maximisation",
+    "als": "autocovariance least squares",
     "still": "noise at rest",
 }
 HEAD = ("knob", "before", "after", "factor", "95 % interval", "unit")

@@ -22,7 +22,7 @@ COUPLED = 0.1  # a smaller correlation is not worth a matrix
 def lines_of(dataset: Dataset, found: Tuning) -> tuple[str, ...]:
     """Values by name where the model has names for them, else the arguments of its parts."""
     factors = all(found.units.get(name) == "×" for name in found.values)
-    if found.method == "em" or factors:
+    if found.method in {"em", "als"} or factors:
         return () if found.model is None else tuple(_changed(dataset.model, found.model))
     units = {name: f"  # {unit}" if (unit := found.units.get(name)) else "" for name in found.values}
     turned = {name: value for name, value in found.values.items() if value != found.initial.get(name)}

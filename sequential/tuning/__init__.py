@@ -1,5 +1,6 @@
-"""Noise levels from the readings: at rest, by the NIS, by maximum likelihood, by expectation-maximisation."""
+"""Noise levels from the readings: at rest, by the NIS, by likelihood, by EM, by autocovariances."""
 
+from sequential.tuning.als import autocovariance_least_squares
 from sequential.tuning.by_nis import tune_by_nis
 from sequential.tuning.em import expectation_maximization
 from sequential.tuning.knobs import Knob
@@ -14,6 +15,7 @@ __all__ = [
     "Knob",
     "Tuning",
     "Verdict",
+    "autocovariance_least_squares",
     "expectation_maximization",
     "innovation_log_likelihood",
     "judge",

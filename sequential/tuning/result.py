@@ -20,6 +20,7 @@ TITLES = {
     "ml": "maximum likelihood of the innovations",
     "nis": "mean NIS brought to what is expected",
     "em": "expectation-maximisation",
+    "als": "autocovariance least squares",
     "still": "a recording at rest",
 }
 
@@ -38,7 +39,7 @@ class Tuning:
     decades : standard deviation of log10(value), by knob name, from the curvature at the optimum; NaN where
         that is not a maximum in every direction
     converged : the search met its tolerances
-    method : "ml", "nis", "em" or "still"
+    method : "ml", "nis", "em", "als" or "still"
     units : by knob name
     limits : 95 % intervals that do not come from `decades`; an end of 0 or infinity is open
     matrices : whole covariances that were estimated, by name
