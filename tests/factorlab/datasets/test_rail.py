@@ -63,7 +63,7 @@ def test_smoothers_are_one(rail):
 def test_the_filter_says_how_far_off_it_is(rail):
     result = run(KalmanFilter(), rail.model, rail.log)
     rmse, honest = score(rail, result)
-    assert rmse < 0.0066
+    assert rmse < 0.0058
     assert 0.8 < honest < 1.2
     assert 0.95 < np.mean(result.innovations["laser"].nis()) < 1.05
 
@@ -155,9 +155,8 @@ def test_the_truth_is_late_against_both(rail):
 
 
 def test_the_noise_is_where_its_likelihood_is_largest(rail):
-    minutes = rail.log.between(stop=rail.model.start_ns + 300 * 10**9)
-    found = tune(rail.build, rail.knobs, minutes)
-    assert found.log_likelihood_after - found.log_likelihood_before < 60
+    found = tune(rail.build, rail.knobs, rail.log)
+    assert found.log_likelihood_after - found.log_likelihood_before < 3
 
 
 def test_the_command_has_every_row(rail):
@@ -165,7 +164,7 @@ def test_the_command_has_every_row(rail):
     rows = whole["estimators"]
     assert list(rows) == ["kf", "kf_rts", "ieks", "batch"]
     for row in rows.values():
-        assert row["rmse_m"] < 0.0066
+        assert row["rmse_m"] < 0.0058
         assert 0.7 < row["normalised_error"]["mean"] < 1.3
         assert row["nis"]["count"] == 12709
     assert rows["kf_rts"]["rmse_m"] == pytest.approx(rows["batch"]["rmse_m"], rel=1e-9)
