@@ -22,6 +22,9 @@ SPREADS = [
     sq.UnscentedKalmanFilter(keep=True),
     sq.UnscentedKalmanFilter(alpha=0.5, kappa=1.0, keep=True),
     sq.UnscentedKalmanFilter(kappa=-1.0, keep=True),
+    sq.UnscentedKalmanFilter(points="julier", kappa=1.0, keep=True),
+    sq.UnscentedKalmanFilter(points="simplex", keep=True),
+    sq.CubatureKalmanFilter(keep=True),
 ]
 FORMS = [sq.KalmanFilter(keep=True, form=form) for form in ("joseph", "ud", "sqrt", "information")]
 

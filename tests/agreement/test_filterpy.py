@@ -56,3 +56,34 @@ def test_smoother(pair):
     run = sq.run(sq.RauchTungStriebel(), WORLD.model, drawn.log)
     np.testing.assert_allclose(run.mean, means, rtol=0, atol=1e-9)
     np.testing.assert_allclose(run.cov, covs, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6])
+@pytest.mark.parametrize("points", ["merwe", "julier", "simplex"])
+def test_sigma_points(points, n, rng):
+    """The same weights, and the same points; those of the simplex are turned, and have the same moments."""
+    mean, root = rng.standard_normal(n), rng.standard_normal((n, n + 1))
+    cov = root @ root.T
+    theirs = {
+        "merwe": filterpy.MerweScaledSigmaPoints(n, 0.4, 2.0, 0.7),
+        "julier": filterpy.JulierSigmaPoints(n, 0.7),
+        "simplex": filterpy.SimplexSigmaPoints(n),
+    }[points]
+    ours = sq.sigma_points(mean, cov, 0.7, points=points, alpha=0.4)
+    mean_weights, cov_weights = theirs.Wm, theirs.Wc
+    expected = theirs.sigma_points(mean, cov)
+    if points == "simplex":
+        assert sorted(ours.mean_weights[ours.mean_weights > 0]) == pytest.approx(sorted(mean_weights))
+    else:
+        np.testing.assert_allclose(ours.mean_weights, mean_weights, rtol=1e-12)
+        np.testing.assert_allclose(ours.cov_weights, cov_weights, rtol=1e-12)
+        away = np.abs(ours.points[:, None] - expected[None]).max(axis=2)
+        assert away.min(axis=0).max() < 1e-12
+        assert away.min(axis=1).max() < 1e-12
+    for found, weights, spread in (
+        (ours.points, ours.mean_weights, ours.cov_weights),
+        (expected, mean_weights, cov_weights),
+    ):
+        np.testing.assert_allclose(weights @ found, mean, atol=1e-12)
+        apart = found - mean
+        np.testing.assert_allclose(apart.T @ (spread[:, None] * apart), cov, atol=1e-11)
