@@ -86,9 +86,11 @@ class Driving:
 
     def settled(self, horizon: int) -> int:
         """Until when the moves are final, given that no event before `horizon` is still taken."""
-        if self.covers == "after" or not self.stamps:
-            return horizon
-        return min(horizon, self.stamps[-1])
+        known = bisect_right(self.stamps, horizon)
+        if not known:
+            return ALWAYS  # a sample may still come that is the first
+        # a sample at the horizon may still come, and covers the time since the last one before it
+        return horizon if self.covers == "after" else self.stamps[known - 1]
 
     def forget(self, t: int) -> None:
         """Drop the samples that drive nothing after `t`."""
