@@ -35,9 +35,8 @@ for k in (0, 12, ONLY_TWO - 1, ONLY_TWO + 6, count - 1):
         f"{run.particles.effective[k]:5.0f}, y = {run.mean[k, 1]:5.2f} ± {run.sigmas()[k, 1]:.2f}"
     )
 last = ONLY_TWO - 1
-print(
-    f"EKF, reading {last}: y = {ekf.mean[last, 1]:.2f} ± {ekf.sigmas()[last, 1]:.2f}, truth {path[last, 1]:.2f}"
-)
+at, sigma = ekf.mean[last, 1], ekf.sigmas()[last, 1]
+print(f"EKF, reading {last}: y = {at:.2f} ± {sigma:.2f}, truth {path[last, 1]:.2f}")
 
 assert 0.2 < above[12] < 0.8
 assert above[-1] > 0.99
