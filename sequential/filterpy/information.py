@@ -41,7 +41,11 @@ class FilterpyInformation(LinearRecursion):
     B: Any = Control()
     inv: Any
     K: Any
-    _innovation: tuple[Array, Array, Array] | None = None
+
+    def __init__(self, original: Any) -> None:
+        super().__init__(original)
+        # of the last reading: arrays from the start, which Saver can stack
+        self._seen, self._weight, self._before = self.H.copy(), self.R_inv.copy(), self.P_inv.copy()
 
     def predict(self, u: Any = 0) -> None:
         """One step ahead: P_inv <- (I + M Q)⁻¹ M, M = F⁻ᵀ P_inv F⁻¹, where Q and P_inv may be singular.
@@ -87,7 +91,7 @@ class FilterpyInformation(LinearRecursion):
             _, _, R = without_missing(missing, self.y, H, np.linalg.inv(weight))
             self.y, H, weight = without_missing(missing, self.y, H, np.linalg.inv(R))
         told = H.T @ weight
-        self._innovation = H, weight, self.P_inv
+        self._seen, self._weight, self._before = H, weight, self.P_inv
         self.S = self.P_inv + told @ H
         self.P_inv = self.S.copy()
         self.K = self._solve(self.S, told)
@@ -112,14 +116,12 @@ class FilterpyInformation(LinearRecursion):
         setattr(self, f"P_inv_{when}", self.P_inv.copy())
 
     def _expected(self) -> Array | None:
-        """Covariance of the last innovation, or None where it has none yet."""
-        if self._innovation is None:
-            return None
-        H, weight, before = self._innovation
+        """Covariance of the last innovation, or None where the state had none before."""
         try:
-            return np.asarray(H @ np.linalg.inv(before) @ H.T + np.linalg.inv(weight))
+            P, R = np.linalg.inv(self._before), np.linalg.inv(self._weight)
         except np.linalg.LinAlgError:
             return None
+        return np.asarray(self._seen @ P @ self._seen.T + R)
 
     @property
     def log_likelihood(self) -> float:

@@ -59,7 +59,8 @@ class FilterpyUnscented(Recursion):
     def __init__(self, original: Any) -> None:
         super().__init__(original)
         self.points_fn = sturdy_points(original.points_fn)
-        self._drawn: tuple[Array, Array] | None = None
+        # where points were drawn last; arrays from the start, which Saver can stack
+        self._drawn_x, self._drawn_P = np.full(self.dim_x, np.nan), np.full_like(self.P, np.nan)
 
     @property
     def _dim_x(self) -> int:
@@ -90,11 +91,10 @@ class FilterpyUnscented(Recursion):
 
     def _redraw(self) -> None:
         self.sigmas_f = np.asarray(self.points_fn.sigma_points(self.x, self.P), dtype=np.float64)
-        self._drawn = self.x.copy(), self.P.copy()
+        self._drawn_x, self._drawn_P = self.x.copy(), self.P.copy()
 
     def _is_stale(self) -> bool:
-        drawn = self._drawn
-        return drawn is None or not (np.array_equal(drawn[0], self.x) and np.array_equal(drawn[1], self.P))
+        return not (np.array_equal(self._drawn_x, self.x) and np.array_equal(self._drawn_P, self.P))
 
     def update(self, z: Any, R: Any = None, UT: Any = None, hx: Any = None, **hx_args: Any) -> None:
         """Take in a reading through `hx(x, **hx_args)`; None, or NaN in a component, is nothing read."""

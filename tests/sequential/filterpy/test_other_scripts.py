@@ -180,6 +180,46 @@ def test_headings_mix_over_the_cut():
     assert abs(theirs.x[0]) < 1e-9
 
 
+# --- saving ---
+
+
+def information():
+    kf = kalman.InformationFilter(4, 2)
+    kf.F = np.eye(4)
+    return kf
+
+
+FX, HX = (lambda x, _: tracker(False, 2).F @ x), (lambda x: x[::2])
+EVERY_KIND = {
+    "kalman": lambda: tracker(True, 2),
+    "square root": lambda: kalman.SquareRootKalmanFilter(4, 2),
+    "information": information,
+    "unscented": lambda: kalman.UnscentedKalmanFilter(4, 2, 1.0, HX, FX, kalman.JulierSigmaPoints(4)),
+    "mixing": bank,
+}
+
+
+@pytest.mark.parametrize("make", EVERY_KIND.values(), ids=EVERY_KIND.keys())
+def test_saver_stacks_every_attribute(make, rng):
+    kf = sq.from_filterpy(make())
+    saver = common.Saver(kf, save_current=True)
+    for z in rng.standard_normal((5, 2)):
+        kf.predict()
+        kf.update(z[:, None] if kf.x.ndim == 2 else z)
+        saver.save()
+    for name in ("x", "P", "x_prior", "x_post"):
+        stacked = np.array(saver[name])
+        assert stacked.shape[0] == 6
+        np.testing.assert_array_equal(stacked[-1], getattr(kf, name))
+    later = common.Saver(kf)
+    for z in rng.standard_normal((3, 2)):
+        kf.predict()
+        kf.update(z[:, None] if kf.x.ndim == 2 else z)
+        later.save()
+    later.to_array()
+    assert len(later.x) == 3
+
+
 # --- fixed lag ---
 
 
