@@ -145,6 +145,22 @@ def test_what_is_known_perfectly(estimator, rng):
     np.testing.assert_allclose(run.mean[:, 1], 2.0, atol=1e-12)
 
 
+@every_filter
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_covariance_that_becomes_singular(estimator, noise, rng):
+    """A step that forgets a component without bringing noise to it."""
+    forget = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
+    process = sq.LinearProcess(forget, np.diag([noise, 0.0, 0.0]))
+    sensor = sq.LinearSensor([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]], [1e-4, 0.1])
+    prior = sq.Gaussian(np.zeros(3), np.eye(3))
+    model = sq.StateSpace(sq.Vector(3), prior, process, {"z": sensor}, start=0.0)
+    log = sq.simulate(model, np.arange(30.0), rng).log
+    run, kalman = sq.run(estimator, model, log), sq.run(sq.KalmanFilter(form="ud"), model, log)
+    np.testing.assert_allclose(run.mean, kalman.mean, atol=1e-8)
+    np.testing.assert_allclose(run.cov, kalman.cov, atol=1e-10)
+    assert run.log_likelihood == pytest.approx(kalman.log_likelihood, rel=1e-7)
+
+
 @pytest.mark.parametrize("alpha", [1.0, 0.1, 1e-3])
 @pytest.mark.parametrize("spread", [0.3, 0.5])
 def test_a_bearing_is_averaged_about_the_central_point(alpha, spread):
