@@ -58,24 +58,42 @@ class Online:
     """
 
     __slots__ = (
-        "_address", "_driven", "_failures", "_kept", "_kernel", "_layout", "_ports", "_size",
-        "filter", "model",
-    )  # fmt: skip
+        "_address",
+        "_driven",
+        "_failures",
+        "_filter",
+        "_kept",
+        "_kernel",
+        "_layout",
+        "_model",
+        "_ports",
+        "_size",
+    )
 
     def __init__(self, filter: Any, model: StateSpace) -> None:  # noqa: A002 - the word of the field
-        self.filter, self.model = filter, model
+        self._filter, self._model = filter, model
         self._kept = handle(filter, model)
         self._kernel, self._address, self._layout = self._kept.step, self._kept.address, self._kept.layout
         self._size, self._failures = self._layout.size, self._kept.whole.failures
         self._ports, self._driven = ports_of(model), model.process_functions.inputs > 0
 
+    @property
+    def filter(self) -> Any:
+        """The filter whose settings are used."""
+        return self._filter
+
+    @property
+    def model(self) -> StateSpace:
+        """The declaration."""
+        return self._model
+
     def __reduce__(self) -> tuple[Any, ...]:
         # a copy, also in another process, needs records and scratch memory of its own
-        return Online, (self.filter, self.model)
+        return Online, (self._filter, self._model)
 
     def start(self, t: float | None = None) -> Belief:
         """The prior, at the model's start or else zero, unless a time is given (float s or int ns)."""
-        return self.belief(self.model.prior, (self.model.start_ns or 0) if t is None else t)
+        return self.belief(self._model.prior, (self._model.start_ns or 0) if t is None else t)
 
     def belief(self, gaussian: Gaussian, t: float) -> Belief:
         """A belief of your own, at a time in float seconds or int nanoseconds."""
@@ -100,7 +118,7 @@ class Online:
         ------
         ShapeError, TimeOrderError, NotFiniteError
         """
-        driven = NOTHING if u is None and not self._driven else require_input(self.model, u)
+        driven = NOTHING if u is None and not self._driven else require_input(self._model, u)
         if not 0.0 <= dt < INFINITE:
             raise backwards(dt)
         layout = self._layout
@@ -149,12 +167,12 @@ class Online:
         """
         port = self._ports.get(name)
         if port is None:
-            raise unknown_sensor(self.model, name)
+            raise unknown_sensor(self._model, name)
         if dt is None:
             dt, moved, driven = REST, 0, NOTHING
         elif 0.0 <= dt < INFINITE:
             moved = round(dt * NS)
-            driven = NOTHING if u is None and not self._driven else require_input(self.model, u)
+            driven = NOTHING if u is None and not self._driven else require_input(self._model, u)
         else:
             raise backwards(dt)
         values = contiguous(z, float64)
