@@ -56,6 +56,7 @@ from sequential.models import (
 from sequential.noise import ImuNoise, diagonal
 from sequential.online import Arrivals, Belief, Innovation, Online, Replay, arrivals, stream
 from sequential.run import Estimator, run
+from sequential.series import SeriesRun, filter_series, run_many
 from sequential.signal import Complementary, Hampel, LowPass, MovingMean, SlidingMedian
 from sequential.simulate import Simulation, simulate
 from sequential.smoothers import BackwardSimulation, FixedLagSmoother, IteratedSmoother, RauchTungStriebel
@@ -126,6 +127,7 @@ __all__ = [
     "Run",
     "Sensor",
     "SensorLog",
+    "SeriesRun",
     "SigmaPoints",
     "Simulation",
     "Singer",
@@ -143,12 +145,14 @@ __all__ = [
     "autocovariance_least_squares",
     "diagonal",
     "expectation_maximization",
+    "filter_series",
     "from_filterpy",
     "inertial_state",
     "noise_from_still",
     "prepare",
     "resample",
     "run",
+    "run_many",
     "sigma_points",
     "simulate",
     "steady_state",

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError
+from sequential.manifold import Kind, Manifold
 from sequential.model import Functions, Plain, StateSpace, evaluate
 from sequential.timeline import sealed
 
-__all__ = ["Compiled", "built_in", "compiled"]
+__all__ = ["Compiled", "built_in", "compiled", "made_for"]
 
 Array = NDArray[np.float64]
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -93,9 +94,17 @@ def _lower(model: StateSpace) -> Compiled:
         gate.reshape(len(sensors), widest + 1),
         _ints([s.loss.code if s.loss else 0 for s in sensors]),
         np.array([s.loss.k if s.loss else 0.0 for s in sensors]),
+        _flatness(model.manifold), _ints([_flatness(s.manifold) for s in sensors]), 0,
     )  # fmt: skip
     whole.tables = ModelTables._make(sealed(v) if isinstance(v, np.ndarray) else v for v in entries)
     return whole
+
+
+def _flatness(manifold: Manifold) -> int:
+    kinds = [block.kind for block in manifold.blocks()]
+    if all(kind == Kind.VECTOR for kind in kinds):
+        return 2 if len(kinds) == 1 else 1
+    return 1 if all(kind in {Kind.VECTOR, Kind.SO2} for kind in kinds) else 0
 
 
 def _ints(values: list[int]) -> NDArray[np.int64]:
@@ -145,6 +154,15 @@ def built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) 
     return cfunc(MODEL_SIGNATURE, cache=True, error_model="numpy")(raw)
 
 
+@cache
+def made_for(kernel: Any) -> Callable[..., tuple[float, int]]:
+    """A kernel that is compiled anew for every size that it is called with, and kept on disk."""
+    from numba import njit
+
+    made: Callable[..., tuple[float, int]] = njit(cache=True, error_model="numpy", nogil=True)(kernel.py_func)
+    return made
+
+
 @lru_cache(maxsize=256)
 def _compiled_or_none(raw: Plain, n: int, inputs: int) -> Any:
     """A user's function compiled once, however many models it appears in; None where Numba refuses."""
@@ -166,20 +184,30 @@ def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:
     own = ".copy()" if writes else ""
     arguments = {"x": f"carray(x, ({n},)){own}", "u": f"carray(u, ({inputs},)){own}", "dt": "dt"}
     given = ", ".join(arguments[name] for name in raw.arguments)
-    kind = type(value)
-    take = "value" if kind in {float, int, np.float64} else "flat[i]"
-    flat = (
-        ""
-        if take == "value"
-        else f"    flat = {'value' if kind is np.ndarray else 'np.array(value)'}.ravel()\n"
-    )
-    source = (
-        f"def wrapper(x, u, dt, p, out):\n    value = inner({given})\n{flat}"
-        f"    for i in range({size}):\n        out[i] {'+=' if adds else '='} {take}\n"
+    source = f"def wrapper(x, u, dt, p, out):\n    value = inner({given})\n" + _written(
+        value, size, adds=adds
     )
     scope: dict[str, Any] = {"inner": inner, "carray": carray, "np": np}
     exec(source, scope)  # noqa: S102 - the text above, with nothing of the user's in it
     return cfunc(MODEL_SIGNATURE, error_model="numpy")(scope["wrapper"])
+
+
+def _written(value: Any, size: int, *, adds: bool) -> str:
+    """Source that writes a value of this kind to `out`; numbers and tuples without a temporary array."""
+    sign = "+=" if adds else "="
+    if type(value) in {float, int, np.float64}:
+        return f"    out[0] {sign} value\n"
+    if type(value) is tuple and len(places := _places(value, "value")) == size:
+        return "".join(f"    out[{i}] {sign} {place}\n" for i, place in enumerate(places))
+    flat = "value" if type(value) is np.ndarray else "np.array(value)"
+    return f"    flat = {flat}.ravel()\n    for i in range({size}):\n        out[i] {sign} flat[i]\n"
+
+
+def _places(value: Any, name: str) -> list[str]:
+    """Where the numbers of nested tuples stand, row by row."""
+    if type(value) is not tuple:
+        return [name]
+    return [place for k, inner in enumerate(value) for place in _places(inner, f"{name}[{k}]")]
 
 
 def try_once(raw: Plain, n: int, inputs: int) -> tuple[Any, bool]:

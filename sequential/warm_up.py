@@ -35,6 +35,8 @@ KERNELS = (
     "extended",
     "online_extended",
     "unscented",
+    "linear",
+    "series",
     "multiple_smoothing",
     "factored",
     "online_factored",

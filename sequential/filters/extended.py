@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sequential.compile import compiled
 from sequential.filters.forms import kernel_of, named, require_form, require_informed
 from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.filters.specialised import sizes_of
 from sequential.history import Report, Run
 from sequential.timeline import Problem
 
@@ -26,13 +27,15 @@ class ExtendedKalmanFilter:
     ----------
     keep : keep predictions and transitions, which smoothers need; costs a third of the time
     form : how the covariance is carried, see `sequential.filters.forms`
+    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
     """
 
     keep: bool = False
     form: str = "joseph"
+    specialise: bool = False
 
     def __post_init__(self) -> None:
-        require_form(self.form)
+        require_form(self.form, specialise=self.specialise)
 
     @property
     def name(self) -> str:
@@ -41,7 +44,9 @@ class ExtendedKalmanFilter:
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
+        return filter_problem(
+            problem, self.name, 1, keep=self.keep, form=self.form, specialise=self.specialise
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +74,22 @@ class IteratedExtendedKalmanFilter:
         return filter_problem(problem, self.name, iterations, keep=self.keep, form=self.form)
 
 
-def filter_problem(problem: Problem, name: str, iterations: int, *, keep: bool, form: str = "joseph") -> Run:
+def filter_problem(
+    problem: Problem,
+    name: str,
+    iterations: int,
+    *,
+    keep: bool,
+    form: str = "joseph",
+    specialise: bool = False,
+) -> Run:
     """Run the compiled filter and read its arrays."""
     from sequential.kernels.records import Filtered
 
     whole = compiled(problem.model)
     out = Filtered(*allocate(problem, whole.tables, keep=keep))
     prior = problem.model.prior
-    filter_log = kernel_of(form, iterations)
+    filter_log = kernel_of(form, iterations, sizes_of(whole.tables, specialise=specialise))
     began = time.perf_counter()
     log_likelihood, failed = filter_log(whole.tables, problem.schedule, prior.mean, prior.cov, int(keep), out)
     seconds = time.perf_counter() - began

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from sequential.errors import ModelError
+from sequential.filters.specialised import Sizes, made_for
 from sequential.timeline import Problem
 
 __all__ = ["FORMS", "kernel_of", "named", "require_form", "require_informed"]
@@ -28,10 +29,13 @@ def named(name: str, form: str) -> str:
     return name if form == "joseph" else f"{name}_{form}"
 
 
-def require_form(form: str, *, iterated: bool = False) -> None:
+def require_form(form: str, *, iterated: bool = False, specialise: bool = False) -> None:
     """Raise `ModelError` where there is no such form, or where it cannot be iterated."""
     if form not in FORMS:
         msg = f"a filter has no form {form!r}; the forms are {', '.join(map(repr, FORMS))}"
+        raise ModelError(msg)
+    if specialise and form != "joseph":
+        msg = f"form {form!r} has no kernels of one size; leave out specialise=True, or take form='joseph'"
         raise ModelError(msg)
     if iterated and form == "information":
         msg = (
@@ -41,7 +45,7 @@ def require_form(form: str, *, iterated: bool = False) -> None:
         raise ModelError(msg)
 
 
-def kernel_of(form: str, iterations: int) -> Callable[..., tuple[float, int]]:
+def kernel_of(form: str, iterations: int, sizes: Sizes) -> Callable[..., tuple[float, int]]:
     """The compiled filter of a form: (tables, schedule, mean, cov, keep, out) -> (log likelihood, code)."""
     if form == "information":
         from sequential.kernels.information import filter_information
@@ -56,7 +60,8 @@ def kernel_of(form: str, iterations: int) -> Callable[..., tuple[float, int]]:
         )
     from sequential.kernels.extended import filter_log
 
-    return lambda a, b, mean, cov, keep, out: filter_log(a, b, mean, cov, iterations, keep, out)
+    kernel = made_for(filter_log) if any(sizes) else filter_log
+    return lambda a, b, mean, cov, keep, out: kernel(a, b, mean, cov, iterations, keep, out, *sizes)
 
 
 def require_informed(problem: Problem, form: str, failed: int, filtered: Any) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from sequential.errors import NonlinearModelError
 from sequential.filters.extended import filter_problem
 from sequential.filters.forms import named, require_form
+from sequential.filters.linear import filter_linear_problem
 from sequential.history import Run
 from sequential.model import StateSpace
 from sequential.timeline import Problem
@@ -22,13 +23,15 @@ class KalmanFilter:
     ----------
     keep : keep predictions and transitions, which smoothers need
     form : how the covariance is carried, see `sequential.filters.forms`
+    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
     """
 
     keep: bool = False
     form: str = "joseph"
+    specialise: bool = False
 
     def __post_init__(self) -> None:
-        require_form(self.form)
+        require_form(self.form, specialise=self.specialise)
 
     @property
     def name(self) -> str:
@@ -38,6 +41,8 @@ class KalmanFilter:
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log; raises `NonlinearModelError` where the model is not linear."""
         require_linear(problem.model)
+        if self.form == "joseph":
+            return filter_linear_problem(problem, self.name, keep=self.keep, specialise=self.specialise)
         return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
 
 

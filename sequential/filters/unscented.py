@@ -12,6 +12,7 @@ from sequential.compile import compiled
 from sequential.errors import ModelError
 from sequential.filters.sigma_sets import SigmaSet
 from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.filters.specialised import made_for, sizes_of
 from sequential.history import Report, Run
 from sequential.timeline import Problem, sealed
 
@@ -32,6 +33,7 @@ class UnscentedKalmanFilter:
     beta : β of "merwe", 2 is best for Gaussians
     kappa : κ of "merwe" and "julier", secondary spread; below zero a covariance may come out indefinite
     keep : keep predictions and transitions (slopes of the regression), which smoothers need
+    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
     points : "merwe" (2d + 1 points at ±γ along the columns of L, γ² = α² (d + κ)), "julier" (the same with
         α = 1 and β = 0: Julier, Uhlmann 1997) or "simplex" (d + 1 points: Moireau, Chapelle 2011), which
         takes none of α, β and κ
@@ -46,6 +48,7 @@ class UnscentedKalmanFilter:
     beta: float = 2.0
     kappa: float = 0.0
     keep: bool = False
+    specialise: bool = False
     points: str = "merwe"
 
     def __post_init__(self) -> None:
@@ -68,7 +71,7 @@ class UnscentedKalmanFilter:
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        return filter_points(problem, self.name, self.set(), keep=self.keep)
+        return filter_points(problem, self.name, self.set(), keep=self.keep, specialise=self.specialise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +94,9 @@ class CubatureKalmanFilter:
         return filter_points(problem, self.name, SigmaSet("cubature"), keep=self.keep)
 
 
-def filter_points(problem: Problem, name: str, chosen: SigmaSet, *, keep: bool) -> Run:
+def filter_points(
+    problem: Problem, name: str, chosen: SigmaSet, *, keep: bool, specialise: bool = False
+) -> Run:
     """Run the compiled filter with a set of points and read its arrays."""
     from sequential.kernels.records import Filtered
     from sequential.kernels.unscented import filter_sigma_points
@@ -101,9 +106,11 @@ def filter_points(problem: Problem, name: str, chosen: SigmaSet, *, keep: bool) 
     prior, d = problem.model.prior, whole.tables.d
     weights, unit = sealed(chosen.weights(d)), sealed(chosen.unit(d))
     began = time.perf_counter()
-    log_likelihood, failed = filter_sigma_points(
-        whole.tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out
-    )
+    kernel = made_for(filter_sigma_points) if specialise else filter_sigma_points
+    log_likelihood, failed = kernel(
+        whole.tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out,
+        *sizes_of(whole.tables, specialise=specialise),
+    )  # fmt: skip
     seconds = time.perf_counter() - began
     whole.raise_failures()
     require_solved(problem, failed, out)

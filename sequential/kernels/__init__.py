@@ -19,6 +19,11 @@ __all__ = ["cache_folder"]
 INLINED = (
     "kernels/arrays.py",
     "kernels/belief.py",
+    "kernels/correcting.py",
+    "kernels/rows.py",
+    "kernels/linear_steps.py",
+    "kernels/sizes.py",
+    "kernels/flat.py",
     "kernels/bierman.py",
     "kernels/call.py",
     "kernels/moving.py",

@@ -6,10 +6,9 @@ import math
 
 from numba import types
 
-from sequential.kernels.arrays import f0, f1, f2, i0, w1, w2
-from sequential.kernels.call import bare_as, inlined
+from sequential.kernels.arrays import b0, f0, f1, f2, i0, w1, w2
+from sequential.kernels.call import inlined, inlined_as
 from sequential.kernels.matrices import (
-    add_product_nt,
     cholesky,
     multiply,
     multiply_nt,
@@ -17,14 +16,16 @@ from sequential.kernels.matrices import (
     solve_lower_transposed,
     symmetrise,
 )
+from sequential.kernels.sizes import reading_dim
 
 __all__ = ["LOG_TWO_PI", "add_correction", "admit", "gain_and_innovation", "joseph"]
 
 PAIR = types.Tuple([f0, f0])
 LOG_TWO_PI = math.log(2.0 * math.pi)
+TINIEST, LARGEST = 1e-100, 1e100  # within these a product of pivots is kept, for one logarithm at the end
 
 
-@bare_as(PAIR(f2, f2, f2, f0, f1, i0, i0, w2, w2, w2, w2))
+@inlined_as(PAIR(f2, f2, f2, f0, f1, i0, i0, w2, w2, w2, w2))
 def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):
     """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹; returns (NIS, log det S), NIS negative if S is not positive definite.
 
@@ -44,40 +45,54 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
             gain[i, j] = cross[i, j]
     solve_lower(lower, gain, m, d)
     solve_lower_transposed(lower, gain, m, d)
-    nis, log_det = 0.0, 0.0
+    nis, log_det, determinant = 0.0, 0.0, 1.0
     for i in range(m):
         s = residual[i]
         for k in range(i):
             s -= lower[i, k] * cross[k, 0]
         cross[i, 0] = s / lower[i, i]
         nis += cross[i, 0] * cross[i, 0]
-        log_det += 2.0 * math.log(lower[i, i])
-    return nis, log_det
+        determinant *= lower[i, i]
+        if not TINIEST < determinant < LARGEST:
+            log_det += math.log(determinant)
+            determinant = 1.0
+    return nis, 2.0 * (log_det + math.log(determinant))
 
 
-@bare_as(types.void(w2, f2, f2, f2, f0, i0, i0, w2, w2, w2))
-def joseph(p, h, gain, noise, weight, m, d, left, work, scaled):
-    """P <- (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; symmetric for any gain."""
+@inlined_as(b0(f2, f2, f2, f2, f0, i0, i0, w2, w2, w2))
+def joseph(p, h, gain, noise, weight, m, d, out, projected, spread):
+    """out = (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; False: a variance is negative.
+
+    Multiplied out as M - (M Hᵀ - K R/w) Kᵀ with M = P - K H P, which holds for any gain and costs no product
+    of two (d, d) matrices (Bierman 1977, section V.2).
+    """
+    multiply(h, p, projected, m, d, d)
     for i in range(d):
         for j in range(d):
-            s = 1.0 if i == j else 0.0
+            s = p[i, j]
             for k in range(m):
-                s -= gain[k, i] * h[k, j]
-            left[i, j] = s
-    multiply(left, p, work, d, d, d)
-    multiply_nt(work, left, p, d, d, d)
-    for i in range(d):
-        for j in range(m):
+                s -= gain[k, i] * projected[k, j]
+            out[i, j] = s
+        for a in range(m):
             s = 0.0
+            for j in range(d):
+                s += out[i, j] * h[a, j]
             for k in range(m):
-                s += gain[k, i] * noise[k, j]
-            scaled[i, j] = s / weight
-            left[i, j] = gain[j, i]
-    add_product_nt(scaled, left, p, d, m, d)
-    symmetrise(p, d)
+                s -= gain[k, i] * noise[k, a] / weight
+            spread[i, a] = s
+    sound = True
+    for i in range(d):
+        for j in range(i + 1):
+            s = out[i, j]
+            for a in range(m):
+                s -= spread[i, a] * gain[a, j]
+            out[i, j] = s
+            out[j, i] = s
+        sound = sound and out[i, i] >= 0.0
+    return sound
 
 
-@bare_as(types.void(f2, f1, i0, i0, w1))
+@inlined_as(types.void(f2, f1, i0, i0, w1))
 def add_correction(gain, residual, m, d, out):
     """out (d,) += K residual, with Kᵀ (m, d) in `gain`."""
     for i in range(d):
@@ -89,7 +104,7 @@ def add_correction(gain, residual, m, d, out):
 def admit(model, plan, reading, nis, residual, innovation_cov, out):
     """Write the innovation down and judge it: 1 take it, 0 the gate is shut, -1 S was indefinite."""
     s = plan.sensor[reading]
-    m = model.z_dim[s]
+    m = reading_dim(model, s)
     for i in range(m):
         out.residual[reading, i] = residual[i]
         for j in range(m):

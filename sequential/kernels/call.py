@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-__all__ = ["MODEL_SIGNATURE", "allocating", "bare", "bare_as", "call", "inlined"]
+__all__ = ["MODEL_SIGNATURE", "allocating", "bare", "bare_as", "call", "inlined", "inlined_as", "owning"]
 
 # Numba counts a reference for every array that a function is handed, and for each one inside a record:
 # 250 ns for a call that takes a model.  `bare` functions allocate nothing and do without the counting, which
@@ -28,7 +28,14 @@ def bare_as(signature: Any) -> Any:
     return njit(signature, cache=True, error_model="numpy", _nrt=False)
 
 
+def inlined_as(signature: Any) -> Any:
+    """`bare_as` for what is so small that a call costs more than the work: most small matrices."""
+    return njit(signature, cache=True, error_model="numpy", _nrt=False, forceinline=True)
+
+
 allocating = njit(cache=True, error_model="numpy", _nrt=True)
+# what returns arrays owes its caller their references; inlined, so that their sizes may be constants
+owning = njit(cache=True, error_model="numpy", _nrt=True, forceinline=True)
 
 POINTER = types.CPointer(types.float64)
 MODEL_SIGNATURE = types.void(POINTER, POINTER, types.float64, POINTER, POINTER)

@@ -35,7 +35,9 @@ VECTOR, SO2, SO3, SE2, SE3, NAV = range(6)
 
 @bare_as(f0(f0))
 def wrap(angle):
-    """Angle in ]-π, π]."""
+    """Angle in ]-π, π]; one that is there already stays as it is, to the last bit."""
+    if -math.pi < angle <= math.pi:
+        return angle
     return math.atan2(math.sin(angle), math.cos(angle))
 
 

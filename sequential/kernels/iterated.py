@@ -13,12 +13,12 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.arrays import f0, f1, f2, i0, w2
-from sequential.kernels.belief import add_correction, gain_and_innovation, joseph
 from sequential.kernels.call import bare, bare_as, inlined
+from sequential.kernels.correcting import correct, correction_scratch, settle
 from sequential.kernels.matrices import copy_matrix, copy_vector, multiply, multiply_nt
 from sequential.kernels.moving import linearise_move, linearise_prior
 from sequential.kernels.records import MODEL, SCHEDULE
-from sequential.kernels.sensing import loss_weight, measure, scratch_size, sensor_jacobian
+from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
 
 __all__ = ["LINEARISED", "Linearised", "filter_steps"]
 
@@ -42,7 +42,7 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     """Update the belief about δ by one reading linearised at the trajectory, with the robust weight there."""
     s = plan.sensor[reading]
     m, d = model.z_dim[s], model.d
-    h, flat, cross, gain, innovation_cov, lower, scaled = update
+    h, flat, cross, lower = update[0], update[1], update[2], update[5]
     noise = plan.noise_cov[plan.noise_row[reading]]
     measure(model, plan, reading, trajectory, at, expected, residual)
     sensor_jacobian(model, plan, reading, trajectory, at, expected, flat, h)
@@ -54,11 +54,11 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     for i in range(m):
         for k in range(d):
             residual[i] -= h[i, k] * mean[k]
-    nis, _ = gain_and_innovation(cov, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain)
-    if nis < 0.0:
+    nis, _, redone = correct(cov, h, noise, weight, residual, m, d, update)
+    if nis < 0.0 or not settle(cov, h, noise, weight, residual, m, d, update, work, redone):
         return -1
-    add_correction(gain, residual, m, d, mean)
-    joseph(cov, h, gain, noise, weight, m, d, work[0], work[1], scaled)
+    for i in range(d):
+        mean[i] += update[7][i]
     return 0
 
 
@@ -126,11 +126,7 @@ def filter_steps(model, plan, prior_mean, prior_cov, trajectory, out):
     x, q = belief[:n], belief[n:].reshape((d, d))
     frames = (np.empty((d, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
-    flat = np.empty(scratch_size(n, d, widest))
-    update = (
-        np.empty((widest, d)), flat, np.empty((widest, d)), np.empty((widest, d)),
-        np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
-    )  # fmt: skip
+    update = correction_scratch(n, d, widest)
     states = trajectory.reshape(-1)
     vectors = (np.zeros(d), np.empty(d), np.empty(d), np.empty(widest), np.empty(widest))
     prior = (prior_mean, prior_cov)

@@ -7,7 +7,7 @@ import math
 from numba import types
 
 from sequential.kernels.arrays import b0, f0, f1, f2, i0, w1, w2
-from sequential.kernels.call import bare_as
+from sequential.kernels.call import inlined_as
 
 __all__ = [
     "add_product_nt",
@@ -23,17 +23,18 @@ __all__ = [
     "symmetrise",
 ]
 
+SMALL = 6
 TINY = 1e-13  # a pivot below this share of its diagonal has been lost to rounding
 
 
-@bare_as(types.void(f1, w1))
+@inlined_as(types.void(f1, w1))
 def copy_vector(a, out):
     """out = a, without the temporary that a slice assignment may take."""
     for i in range(len(a)):
         out[i] = a[i]
 
 
-@bare_as(types.void(f2, w2))
+@inlined_as(types.void(f2, w2))
 def copy_matrix(a, out):
     """out = a for matrices of a's shape."""
     for i in range(a.shape[0]):
@@ -41,7 +42,7 @@ def copy_matrix(a, out):
             out[i, j] = a[i, j]
 
 
-@bare_as(types.void(w2, f0))
+@inlined_as(types.void(w2, f0))
 def fill_diagonal(out, value):
     """out = value times the identity."""
     for i in range(out.shape[0]):
@@ -49,7 +50,7 @@ def fill_diagonal(out, value):
             out[i, j] = value if i == j else 0.0
 
 
-@bare_as(types.void(f2, f2, w2, i0, i0, i0))
+@inlined_as(types.void(f2, f2, w2, i0, i0, i0))
 def multiply(a, b, out, n, m, p):
     """out (n, p) = a (n, m) b (m, p); zeros of a are skipped, which pays for a sparse Jacobian."""
     for i in range(n):
@@ -62,7 +63,7 @@ def multiply(a, b, out, n, m, p):
                     out[i, j] += s * b[k, j]
 
 
-@bare_as(types.void(f2, f2, w2, i0, i0, i0))
+@inlined_as(types.void(f2, f2, w2, i0, i0, i0))
 def multiply_nt(a, b, out, n, m, p):
     """out (n, p) = a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
@@ -73,7 +74,7 @@ def multiply_nt(a, b, out, n, m, p):
             out[i, j] = s
 
 
-@bare_as(types.void(f2, f2, w2, i0, i0, i0))
+@inlined_as(types.void(f2, f2, w2, i0, i0, i0))
 def add_product_nt(a, b, out, n, m, p):
     """out (n, p) += a (n, m) bᵀ, with b (p, m)."""
     for i in range(n):
@@ -84,7 +85,7 @@ def add_product_nt(a, b, out, n, m, p):
             out[i, j] += s
 
 
-@bare_as(types.void(w2, i0))
+@inlined_as(types.void(w2, i0))
 def symmetrise(a, n):
     """a <- (a + aᵀ) / 2."""
     for i in range(n):
@@ -94,10 +95,19 @@ def symmetrise(a, n):
             a[j, i] = s
 
 
-@bare_as(types.void(f2, w2, w2, w2, i0))
+@inlined_as(types.void(f2, w2, w2, w2, i0))
 def push_covariance(f, p, work, flipped, d):
-    """p <- F p Fᵀ for symmetric p, as F (F p)ᵀ: both products skip the zeros of F."""
+    """p <- F p Fᵀ for symmetric p; as F (F p)ᵀ unless it is small, so that both products skip zeros of F."""
     multiply(f, p, work, d, d, d)
+    if d <= SMALL:
+        for i in range(d):
+            for j in range(i + 1):
+                s = 0.0
+                for k in range(d):
+                    s += f[j, k] * work[i, k]
+                p[i, j] = s
+                p[j, i] = s
+        return
     for i in range(d):
         for j in range(d):
             flipped[i, j] = work[j, i]
@@ -105,7 +115,7 @@ def push_covariance(f, p, work, flipped, d):
     symmetrise(p, d)
 
 
-@bare_as(i0(f2, w2, i0, b0))
+@inlined_as(i0(f2, w2, i0, b0))
 def cholesky(a, lower, n, lenient):
     """Lower factor of a; returns the number of pivots lost to rounding.
 
@@ -137,7 +147,7 @@ def cholesky(a, lower, n, lenient):
     return lost
 
 
-@bare_as(types.void(f2, w2, i0, i0))
+@inlined_as(types.void(f2, w2, i0, i0))
 def solve_lower(lower, b, n, p):
     """b (n, p) <- L⁻¹ b; rows of lost pivots become zero."""
     for i in range(n):
@@ -150,7 +160,7 @@ def solve_lower(lower, b, n, p):
             b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0
 
 
-@bare_as(types.void(f2, w2, i0, i0))
+@inlined_as(types.void(f2, w2, i0, i0))
 def solve_lower_transposed(lower, b, n, p):
     """b (n, p) <- L⁻ᵀ b; rows of lost pivots become zero."""
     for i in range(n - 1, -1, -1):

@@ -47,6 +47,7 @@ def mode_of(base, modes, j, gate):
         modes.process[j, 3], modes.process[j, 4], modes.params[j], modes.observe[j],
         modes.observe_jacobian[j], modes.sensor_params[j], modes.sensor_params_at[j], base.z_table,
         base.z_first, base.z_size, base.z_dim, gate, modes.loss[j], modes.loss_k[j],
+        base.flat, base.z_flat, base.m,
     )  # fmt: skip
 
 

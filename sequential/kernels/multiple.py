@@ -16,13 +16,14 @@ from sequential.kernels.arrays import f1, f2, f3, i0, w2, w3
 from sequential.kernels.belief import gain_and_innovation
 from sequential.kernels.call import bare, inlined
 from sequential.kernels.charts import wrap
+from sequential.kernels.correcting import correction_scratch
 from sequential.kernels.extended import absorb
 from sequential.kernels.matrices import copy_matrix, copy_vector
 from sequential.kernels.mixing import largest, mix, normalise
 from sequential.kernels.modes import MODE_OUT, MODES, filtered_of, mode_of, plan_of
 from sequential.kernels.moving import predict
 from sequential.kernels.records import FINISHED, MODEL, SCHEDULE
-from sequential.kernels.sensing import measure, scratch_size, sensor_jacobian
+from sequential.kernels.sensing import measure, sensor_jacobian
 
 __all__ = ["filter_modes"]
 
@@ -34,7 +35,14 @@ def inside(base, modes, plan, reading, beliefs, update, expected, residual):
     """Whether a reading lies inside the gate of any model; without gates every reading does."""
     s, rows, n, d = plan.sensor[reading], plan.rows[reading], base.n, base.d
     m = base.z_dim[s]
-    h, flat, cross, gain, innovation_cov, lower, _, _, _ = update
+    h, flat, cross, gain, innovation_cov, lower = (
+        update[0],
+        update[1],
+        update[2],
+        update[3],
+        update[4],
+        update[5],
+    )
     for j in range(len(beliefs)):
         threshold = modes.gate[j, s, rows]
         if threshold == math.inf:
@@ -175,11 +183,7 @@ def filter_modes(
         np.empty(d), np.empty(d), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)),
     )  # fmt: skip
     work = (np.empty((d, d)), np.empty((d, d)), np.empty(n), np.empty((d, d)))
-    update = (
-        np.empty((widest, d)), np.empty(scratch_size(n, d, widest)), np.empty((widest, d)),
-        np.empty((widest, d)), np.empty((widest, widest)), np.empty((widest, widest)),
-        np.empty((d, max(widest, d))), np.empty(d), np.empty(d),
-    )  # fmt: skip
+    update = correction_scratch(n, d, widest)
     scratch = (update, work, np.empty(widest), np.empty(widest))
     return filter_nodes(
         base, modes, plan, transitions, iterations, state, scratch, moments, out, probability, mean, cov,

@@ -35,11 +35,38 @@ class ModelTables(NamedTuple):
     gate: Any  # (S, m+1) largest NIS that is accepted of so many components; infinity without a gate
     loss: Any  # (S,) 0 none, 1 Huber, 2 Cauchy
     loss_k: Any  # (S,)
+    flat: int  # how the state's tangents add, see `kernels.flat`
+    z_flat: Any  # (S,) the same for measurements
+    m: int  # tangent of every measurement in a kernel made for one size, else 0
 
 
 _int = types.int64
 MODEL = types.NamedTuple(
-    [i2, _int, _int, _int, _int, _int, _int, _int, f1, i1, i1, f1, i1, i2, i1, i1, i1, f2, i1, f1],
+    [
+        i2,
+        _int,
+        _int,
+        _int,
+        _int,
+        _int,
+        _int,
+        _int,
+        f1,
+        i1,
+        i1,
+        f1,
+        i1,
+        i2,
+        i1,
+        i1,
+        i1,
+        f2,
+        i1,
+        f1,
+        _int,
+        i1,
+        _int,
+    ],
     ModelTables,
 )
 SCHEDULE = types.NamedTuple([i1, f1, i1, f2, i1, i1, f2, f2, f1, f3, i1, i1], Schedule)

@@ -14,6 +14,8 @@ import numpy as np
 from sequential.kernels.arrays import f0, i0
 from sequential.kernels.call import allocating, bare, bare_as, call, inlined
 from sequential.kernels.charts import local, retract
+from sequential.kernels.flat import local_reading
+from sequential.kernels.sizes import reading_dim
 
 __all__ = ["loss_weight", "measure", "process_jacobian", "scratch_size", "sensor_jacobian"]
 
@@ -65,9 +67,10 @@ def measure(model, plan, reading, x, x_at, expected, residual):
         model.observe[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
         model.sensor_params, model.sensor_params_at[s], expected, 0,
     )  # fmt: skip
-    local(model.z_table, model.z_first[s], model.z_first[s + 1], expected, 0, plan.z_flat, z_at, residual, 0)
-    if plan.rows[reading] < model.z_dim[s]:
-        for i in range(model.z_dim[s]):
+    m = reading_dim(model, s)
+    local_reading(model, s, m, expected, 0, plan.z_flat, z_at, residual, 0)
+    if plan.rows[reading] < m:
+        for i in range(m):
             if math.isnan(plan.z[reading, i]):
                 residual[i] = 0.0
 
@@ -105,6 +108,7 @@ def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
     Rows of missing components are zero: with their unit variance in the schedule they say nothing.
     """
     s = plan.sensor[reading]
+    m = reading_dim(model, s)
     if model.observe_jacobian[s] == 0:
         difference_sensor(model, plan, reading, x, x_at, expected, flat, out)
     else:
@@ -112,11 +116,11 @@ def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
             model.observe_jacobian[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
             model.sensor_params, model.sensor_params_at[s], flat, 0,
         )  # fmt: skip
-        for i in range(model.z_dim[s]):
+        for i in range(m):
             for j in range(model.d):
                 out[i, j] = flat[i * model.d + j]
-    if plan.rows[reading] < model.z_dim[s]:
-        for i in range(model.z_dim[s]):
+    if plan.rows[reading] < m:
+        for i in range(m):
             if math.isnan(plan.z[reading, i]):
                 for j in range(model.d):
                     out[i, j] = 0.0

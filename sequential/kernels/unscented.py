@@ -32,6 +32,7 @@ from sequential.kernels.sigma_points import (
     tangent_to,
     unexplained,
 )
+from sequential.kernels.sizes import ANY_SIZE, reading_dim, sized
 
 __all__ = ["filter_sigma_points"]
 
@@ -68,7 +69,7 @@ def look(model, plan, reading, x, p, weights, unit, sigma, seen):
     points, _, _, steps, lower, _ = sigma
     images, tangents, expected, residual, move, projected, moment, rest = seen
     s = plan.sensor[reading]
-    m, n, d = model.z_dim[s], model.n, model.d
+    m, n, d = reading_dim(model, s), model.n, model.d
     width, wide = plan.context.shape[1], images.shape[1]
     first, last, at = model.z_first[s], model.z_first[s + 1], model.sensor_params_at[s]
     if not factor(p, d, lower):
@@ -195,7 +196,7 @@ def absorb(model, plan, reading, x, p, weights, unit, sigma, seen, update, out):
     gain, innovation_cov, factored, white, left, scaled, delta, doubt = update
     lower, residual, projected, moment, rest = sigma[4], seen[3], seen[5], seen[6], seen[7]
     s, given = plan.sensor[reading], plan.noise_cov[plan.noise_row[reading]]
-    m, d, rows = model.z_dim[s], model.d, plan.rows[reading]
+    m, d, rows = reading_dim(model, s), model.d, plan.rows[reading]
     if not look(model, plan, reading, x, p, weights, unit, sigma, seen):
         return math.nan
     nis, log_det = gain_of(
@@ -222,7 +223,7 @@ def absorb(model, plan, reading, x, p, weights, unit, sigma, seen, update, out):
     return -0.5 * (nis + log_det + rows * LOG_TWO_PI)
 
 
-@bare
+@inlined
 def filter_nodes(model, plan, x, p, phi, weights, unit, keep, sigma, seen, update, work, out):
     """The loop of `filter_sigma_points`, with every array at hand."""
     log_likelihood = 0.0
@@ -250,12 +251,17 @@ def filter_nodes(model, plan, x, p, phi, weights, unit, keep, sigma, seen, updat
     return log_likelihood, -1
 
 
-@njit(FINISHED(MODEL, SCHEDULE, f1, f2, f1, f2, types.int64, FILTERED), cache=True, error_model="numpy")
-def filter_sigma_points(model, plan, prior_mean, prior_cov, weights, unit, keep, out):
+@njit(
+    FINISHED(MODEL, SCHEDULE, f1, f2, f1, f2, types.int64, FILTERED, ANY_SIZE, ANY_SIZE, ANY_SIZE),
+    cache=True, error_model="numpy", nogil=True,
+)  # fmt: skip
+def filter_sigma_points(
+    model, plan, prior_mean, prior_cov, weights, unit, keep, out, storage, tangent, reading
+):  # fmt: skip
     """Run the filter with a set of points, see `sigma_points`.
 
     Returns (log likelihood, code): -1, or the reading at which S or P was not positive definite, or -2 - k
-    where P was not on the way to node k.
+    where P was not on the way to node k.  The last three arguments are sizes, as in `kernels.sizes`.
     """
     n, d, widest = model.n, model.d, plan.z.shape[1]
     count = 1 + (2 * d if unit.shape[0] == 0 else unit.shape[0])
@@ -277,6 +283,6 @@ def filter_sigma_points(model, plan, prior_mean, prior_cov, weights, unit, keep,
     )  # fmt: skip
     work = (np.empty((d, d)), np.empty((d, d)))
     return filter_nodes(
-        model, plan, prior_mean.copy(), prior_cov.copy(), np.eye(d), weights, unit, keep, sigma, seen, update,
-        work, out,
+        sized(model, storage, tangent, reading), plan, prior_mean.copy(), prior_cov.copy(), np.eye(d),
+        weights, unit, keep, sigma, seen, update, work, out,
     )  # fmt: skip

@@ -1,0 +1,40 @@
+"""The compiled filter of linear models."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from sequential.compile import compiled
+from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.filters.specialised import made_for, sizes_of
+from sequential.history import Report, Run
+from sequential.timeline import Problem, sealed
+
+__all__ = ["filter_linear_problem"]
+
+
+def filter_linear_problem(problem: Problem, name: str, *, keep: bool, specialise: bool) -> Run:
+    """Run the compiled linear filter and read its arrays."""
+    from sequential.kernels.linear import filter_linear
+    from sequential.kernels.records import Filtered
+
+    whole, model = compiled(problem.model), problem.model
+    out = Filtered(*allocate(problem, whole.tables, keep=keep))
+    constant = sealed(np.array([f.inputs == 0 for f in model.sensor_functions.values()], dtype=np.int64))
+    driven = int(model.process_functions.inputs > 0)
+    began = time.perf_counter()
+    _, state, reading = sizes_of(whole.tables, specialise=specialise)
+    kernel = made_for(filter_linear) if specialise else filter_linear
+    log_likelihood, failed = kernel(
+        whole.tables, problem.schedule, model.prior.mean, model.prior.cov, driven, constant, int(keep), out,
+        state, reading,
+    )  # fmt: skip
+    seconds = time.perf_counter() - began
+    whole.raise_failures()
+    require_solved(problem, failed, out)
+    require_finite(problem, out.mean)
+    rejected = int((out.accepted == 0).sum())
+    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
+    return as_run(problem, out, log_likelihood, report, keep=keep)

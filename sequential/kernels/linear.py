@@ -1,0 +1,64 @@
+"""The Kalman filter of linear models over a whole log."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from sequential.kernels.arrays import f1, f2, i0, i1
+from sequential.kernels.call import inlined
+from sequential.kernels.linear_steps import absorb, linear_scratch, move
+from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal
+from sequential.kernels.records import FILTERED, FINISHED, MODEL, SCHEDULE
+from sequential.kernels.sizes import ANY_SIZE, known
+
+__all__ = ["filter_linear"]
+
+
+@inlined
+def filter_nodes(model, plan, phi, d, m, driven, constant, scratch, keep, out):
+    """The loop of `filter_linear`, with every array at hand."""
+    (x, p), steps, sights, (update, doubt), (fresh, last) = scratch
+    log_likelihood = 0.0
+    for node in range(len(plan.reading_ptr) - 1):
+        if keep != 0:
+            fill_diagonal(phi, 1.0)
+        move(model, plan, node, x, p, phi, d, driven, last, steps, update[9], keep)
+        if keep != 0:
+            copy_vector(x, out.predicted_mean[node])
+            copy_matrix(p, out.predicted_cov[node])
+            copy_matrix(phi, out.transition[node])
+        failed = -1
+        for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
+            size = known(m, model.z_dim[plan.sensor[reading]])
+            gained = absorb(model, plan, reading, x, p, d, size, sights, constant, fresh, update, doubt, out)
+            if math.isnan(gained):
+                failed = reading
+                break
+            log_likelihood += gained
+        for i in range(d):
+            out.mean[node, i] = x[i]
+            for j in range(d):
+                out.cov[node, i, j] = p[i, j]
+        if failed >= 0:
+            return log_likelihood, failed
+    return log_likelihood, -1
+
+
+@njit(
+    FINISHED(MODEL, SCHEDULE, f1, f2, i0, i1, i0, FILTERED, ANY_SIZE, ANY_SIZE),
+    cache=True, error_model="numpy", nogil=True,
+)  # fmt: skip
+def filter_linear(model, plan, prior_mean, prior_cov, driven, constant, keep, out, state, reading):
+    """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite).
+
+    `driven` says whether an input drives the process, `constant` (S,) whether a sensor has no context;
+    `state` and `reading` are their sizes, as in `sequential.kernels.sizes`.
+    """
+    d = known(state, model.d)
+    scratch = linear_scratch(d, plan.z.shape[1], len(model.z_dim))
+    copy_vector(prior_mean, scratch[0][0])
+    copy_matrix(prior_cov, scratch[0][1])
+    return filter_nodes(model, plan, np.eye(d), d, reading, driven, constant, scratch, keep, out)
