@@ -221,6 +221,8 @@ def _fitted(seen: Array, settled: SteadyState, noises: list[_Noise], lags: int) 
 
     steps, m = seen.shape
     found = [seen[j:].T @ seen[: steps - j] / (steps - j) for j in range(lags)]
+    if not (np.diag(found[0]) > 0.0).all():
+        raise DataError("a sensor reads exactly what the filter predicts: there is no noise to be estimated")
     spread = np.sqrt(np.outer(np.diag(found[0]), np.diag(found[0])))
     keep = [np.triu_indices(m) if j == 0 else np.indices((m, m)).reshape(2, -1) for j in range(lags)]
     error = [np.sqrt((spread**2 + (found[0] ** 2 if j == 0 else 0.0)) / steps) for j in range(lags)]

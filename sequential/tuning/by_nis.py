@@ -30,6 +30,7 @@ __all__ = ["tune_by_nis"]
 Array = NDArray[np.float64]
 STRIDE = 0.5  # decades between the values that are tried until one is on the other side
 REACH = 4.0  # decades: beyond this factor nothing is looked for
+TINY = 1e-30  # stands for a NIS of nothing where logarithms are taken
 CLOSE = 1e-3  # decades to which a crossing is found
 
 
@@ -140,7 +141,7 @@ class _Search:
             try:
                 run, model = self.posterior.run(decades * self.moves)
                 nis, rows = self.squares(run, model)
-                value = float(np.log10(nis.sum() / rows.sum()))
+                value = math.log10(max(float(nis.sum() / rows.sum()), TINY))
             except (FactorlabError, np.linalg.LinAlgError):
                 value = math.nan
             self.known[decades] = value

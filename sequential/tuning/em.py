@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import FactorlabError, ModelError
+from sequential.errors import FactorlabError, ModelError, NotPositiveDefiniteError
 from sequential.filters import ExtendedKalmanFilter
 from sequential.jacobians import unchecked
 from sequential.log import SensorLog
@@ -112,8 +112,12 @@ def expectation_maximization(
         if turn == iterations:
             message = f"still gaining {gain:.2g} in log likelihood after {iterations} iterations"
             break
-        with unchecked():
-            problem = replace(problem, model=plan.maximised(problem, pairs))
+        try:
+            with unchecked():
+                problem = replace(problem, model=plan.maximised(problem, pairs))
+        except NotPositiveDefiniteError as error:  # readings without any scatter leave no noise at all
+            message = f"stopped after {turn} iterations: {error}"
+            break
     fit = Fit(model, best.model, tuple(history), message, plan.notes, plan.form)
     return as_tuning(fit, best, recursive, intervals=intervals, began=began)
 
@@ -124,7 +128,7 @@ def require_plain(model: StateSpace) -> None:
         what = "a gate" if sensor.gate is not None else "a loss" if sensor.loss is not None else ""
         if what:
             raise ModelError(
-                f"sensor {name!r} has {what}, and expectation-maximisation takes its readings for Gaussian; "
+                f"sensor {name!r} has {what}, and this method takes its readings for Gaussian; "
                 "use tune(), which counts them through it, or declare the sensor without"
             )
 

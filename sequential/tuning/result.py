@@ -108,7 +108,7 @@ class Tuning:
             open_end = f"anything below {high:.3g}" if low == 0.0 else f"anything above {low:.3g}"
             return f"{name} is not identified: {open_end} fits these readings as well"
         return (
-            f"{name} is not identified by these readings: its value is what was assumed beforehand, "
+            f"{name} is not identified by these readings: its value rests on what was assumed beforehand, "
             f"{self.initial.get(name, self.values[name]):.3g}, give or take its prior"
         )
 

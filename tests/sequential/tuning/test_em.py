@@ -8,7 +8,6 @@ import pytest
 from worlds import LINEAR_WORLDS, constant_velocity, drive, random_walk, unicycle_range_bearing
 
 import sequential as sq
-from sequential.errors import ModelError
 from sequential.smoothers.pairs import smoothed_pairs
 from sequential.tuning.moments import scale_of
 
@@ -227,32 +226,6 @@ def test_a_process_that_nobody_can_scale_is_held_and_told(rng):
     found = sq.expectation_maximization(model, log, iterations=3)
     assert list(found.values) == ["z σ"]
     assert "held" in found.notes[0]
-
-
-@pytest.mark.parametrize(
-    ("options", "pattern"),
-    [
-        ({"process": "ful"}, "structure of the process noise is one of full"),
-        ({"process": [[1, 1, 0], [1, 1, 1], [0, 1, 1]]}, "made of blocks"),
-        ({"process": [[1, 0], [0, 1]]}, r"shape \(3, 3\)"),
-        ({"sensors": {"pear": "full"}}, "no sensor 'pear'"),
-        ({"process": "held", "sensors": "held"}, "nothing to estimate"),
-        ({"prior": "free"}, "'held', 'mean' or 'both'"),
-    ],
-)
-def test_what_cannot_be_asked(options, pattern, rng):
-    world = random_walk()
-    with pytest.raises(ModelError, match=pattern):
-        sq.expectation_maximization(world.model, world.draw(rng).log, **options)
-
-
-@pytest.mark.parametrize("guard", [{"gate": 0.99}, {"loss": sq.Loss("huber", 1.345)}])
-def test_guarded_sensors_are_refused(guard, rng):
-    world = random_walk()
-    sensors = {**world.model.sensors, "sum": sq.LinearSensor([[1.0, 1.0, 1.0]], 0.4, **guard)}
-    model = dataclasses.replace(world.model, sensors=sensors)
-    with pytest.raises(ModelError, match=r"sensor 'sum' has a .*tune"):
-        sq.expectation_maximization(model, world.draw(rng).log)
 
 
 def test_independent_parts_have_a_factor_each(rng):

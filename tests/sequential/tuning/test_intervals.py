@@ -75,7 +75,7 @@ def test_a_knob_without_effect_is_not_identified(rng):
     assert found.unidentified == ("idle",)
     assert found.converged
     assert (
-        "idle is not identified by these readings: its value is what was assumed beforehand, 7"
+        "idle is not identified by these readings: its value rests on what was assumed beforehand, 7"
         in found.verdict
     )
 
