@@ -38,7 +38,9 @@ def test_readings_without_noise_end_in_a_sentence():
     knobs = [sq.Knob("q", 1.0), sq.Knob("r", 1.0)]
     model = build({"q": 1.0, "r": 1.0})
     found = sq.expectation_maximization(model, log, iterations=2000, tolerance=-1.0, prior="both")
-    assert "stopped after" in found.message
+    assert found.message  # where it ends, rounding decides: nothing is left, or nothing is gained
+    assert not found.converged
+    assert max(found.values.values()) < 1e-9
     assert "R is too large" in sq.tune_by_nis(build, knobs, log, turn=["q"]).message
     with pytest.raises(DataError, match="no noise to be estimated"):
         sq.autocovariance_least_squares(model, log)
