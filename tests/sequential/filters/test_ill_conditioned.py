@@ -48,6 +48,10 @@ def assert_covariances(run):
 @pytest.mark.parametrize(
     ("form", "delta", "bound"),
     [
+        ("joseph", 1e-6, 1e-9),
+        ("joseph", 1e-8, 1e-8),
+        ("joseph", 1e-9, 1e-9),
+        ("joseph", 1e-12, 1e-12),
         ("ud", 1e-6, 1e-9),
         ("ud", 1e-8, 1e-8),
         ("ud", 1e-9, 1e-9),
@@ -167,8 +171,11 @@ def test_no_form_yields_on_random_models(request):
     tally = fuzz(10_000 if request.config.getoption("--full") else 1000)
     assert not tally.exceptions, tally
     assert not tally.not_finite, tally
+    assert not tally.negative_variance, tally
+    # Joseph's form may stop with a sentence, one model in forty
+    assert tally.not_positive_definite["joseph"] < 0.05 * tally.models, tally
     for form in FACTORED:
-        assert tally.negative_variance[form] == tally.indefinite[form] == 0, tally
+        assert tally.indefinite[form] == 0, tally
         assert tally.not_positive_definite[form] == 0, tally
 
 
