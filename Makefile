@@ -42,7 +42,7 @@ check: $(VENV)/installed-test
 
 # Each script saves its JSON document and, when it misses a "must", exits 3: all run, then the whole fails.
 bench: $(VENV)/installed-test warm
-	@mkdir -p $(BENCH_OUT); missed=; \
+	@$(call pip_install,-e '.[bench]'); mkdir -p $(BENCH_OUT); missed=; \
 	for script in tests/benchmarks/*.py; do \
 		[ -e "$$script" ] || continue; \
 		name=$$(basename "$$script" .py); echo "== $$name"; \
