@@ -12,6 +12,7 @@
 (3, 2)
 """
 
+from sequential.correlated import correlated_noise
 from sequential.discretise import van_loan
 from sequential.errors import FactorlabError
 from sequential.filterpy import from_filterpy
@@ -143,6 +144,7 @@ __all__ = [
     "alpha_beta",
     "arrivals",
     "autocovariance_least_squares",
+    "correlated_noise",
     "diagonal",
     "expectation_maximization",
     "filter_series",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sequential.errors import NonlinearModelError
+from sequential.errors import ModelError, NonlinearModelError
 from sequential.filters.extended import filter_problem
 from sequential.filters.forms import named, require_form
 from sequential.filters.linear import filter_linear_problem
@@ -23,15 +23,20 @@ class KalmanFilter:
     ----------
     keep : keep predictions and transitions, which smoothers need
     form : how the covariance is carried, see `sequential.filters.forms`
+    freeze : keep the gain once the covariance changes by less than this share of itself from reading to
+        reading, such as 1e-12, until the rhythm of the readings changes: several times as quick on a long,
+        even log.  Without effect with `keep`, or where an input drives the process
     specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
     """
 
     keep: bool = False
     form: str = "joseph"
+    freeze: float | None = None
     specialise: bool = False
 
     def __post_init__(self) -> None:
         require_form(self.form, specialise=self.specialise)
+        require_freeze(self.freeze, self.form)
 
     @property
     def name(self) -> str:
@@ -42,8 +47,26 @@ class KalmanFilter:
         """Filter the whole log; raises `NonlinearModelError` where the model is not linear."""
         require_linear(problem.model)
         if self.form == "joseph":
-            return filter_linear_problem(problem, self.name, keep=self.keep, specialise=self.specialise)
+            return filter_linear_problem(
+                problem,
+                self.name,
+                keep=self.keep,
+                specialise=self.specialise,
+                freeze=self.freeze or 0.0,
+            )
         return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
+
+
+def require_freeze(freeze: float | None, form: str) -> None:
+    """Raise where a gain cannot be frozen."""
+    if freeze is None:
+        return
+    if not 0.0 < freeze < 1.0:
+        msg = f"freeze is a share of the covariance between 0 and 1, such as 1e-12; got {freeze}"
+        raise ModelError(msg)
+    if form != "joseph":
+        msg = f"form {form!r} computes its factors at every reading; freeze the gain of form='joseph'"
+        raise ModelError(msg)
 
 
 def require_linear(model: StateSpace) -> None:

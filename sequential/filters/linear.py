@@ -15,7 +15,9 @@ from sequential.timeline import Problem, sealed
 __all__ = ["filter_linear_problem"]
 
 
-def filter_linear_problem(problem: Problem, name: str, *, keep: bool, specialise: bool) -> Run:
+def filter_linear_problem(
+    problem: Problem, name: str, *, keep: bool, specialise: bool, freeze: float = 0.0
+) -> Run:
     """Run the compiled linear filter and read its arrays."""
     from sequential.kernels.linear import filter_linear
     from sequential.kernels.records import Filtered
@@ -23,13 +25,14 @@ def filter_linear_problem(problem: Problem, name: str, *, keep: bool, specialise
     whole, model = compiled(problem.model), problem.model
     out = Filtered(*allocate(problem, whole.tables, keep=keep))
     constant = sealed(np.array([f.inputs == 0 for f in model.sensor_functions.values()], dtype=np.int64))
+    freeze = 0.0 if keep or model.process_functions.inputs else freeze
     driven = int(model.process_functions.inputs > 0)
     began = time.perf_counter()
     _, state, reading = sizes_of(whole.tables, specialise=specialise)
     kernel = made_for(filter_linear) if specialise else filter_linear
     log_likelihood, failed = kernel(
-        whole.tables, problem.schedule, model.prior.mean, model.prior.cov, driven, constant, int(keep), out,
-        state, reading,
+        whole.tables, problem.schedule, model.prior.mean, model.prior.cov, driven, constant, int(keep),
+        freeze, out, state, reading,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     whole.raise_failures()

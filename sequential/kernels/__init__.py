@@ -22,6 +22,7 @@ INLINED = (
     "kernels/correcting.py",
     "kernels/rows.py",
     "kernels/linear_steps.py",
+    "kernels/frozen.py",
     "kernels/sizes.py",
     "kernels/flat.py",
     "kernels/bierman.py",

@@ -17,7 +17,7 @@ from sequential.kernels.matrices import copy_matrix, fill_diagonal, multiply
 from sequential.kernels.rows import factor_innovation, gather_rows, project_rows, push_rows, update_rows
 from sequential.kernels.sensing import loss_weight
 
-__all__ = ["absorb", "linear_scratch", "move"]
+__all__ = ["absorb", "expect", "linear_scratch", "move"]
 
 
 @inlined
