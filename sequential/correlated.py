@@ -50,11 +50,11 @@ def correlated_noise(model: StateSpace, cross_cov: Mapping[str, ArrayLike]) -> S
     process = _require_constant(model)
     n = model.manifold.dim
     Q = np.asarray(process.Q, dtype=np.float64)
+    if unknown := [name for name in cross_cov if name not in model.sensors]:
+        raise ModelError(f"there is no sensor {unknown[0]!r}; the model has {', '.join(model.sensors)}")
     crossed = {
         name: _shared(model, name, np.asarray(C, dtype=np.float64), Q) for name, C in cross_cov.items()
     }
-    if unknown := [name for name in crossed if name not in model.sensors]:
-        raise ModelError(f"there is no sensor {unknown[0]!r}; the model has {', '.join(model.sensors)}")
     sizes = {name: L.shape[1] for name, (L, _) in crossed.items()}
     extra = sum(sizes.values())
     if not extra:

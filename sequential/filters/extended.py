@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 from sequential.compile import compiled
-from sequential.filters.forms import kernel_of, named, require_form, require_informed
+from sequential.filters.forms import kernel_of, named, or_in_ud, require_form, require_informed
 from sequential.filters.solution import allocate, as_run, require_finite, require_solved
 from sequential.filters.specialised import sizes_of
 from sequential.history import Report, Run
@@ -44,9 +44,7 @@ class ExtendedKalmanFilter:
 
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
-        return filter_problem(
-            problem, self.name, 1, keep=self.keep, form=self.form, specialise=self.specialise
-        )
+        return filter_safely(problem, self.name, 1, self.form, keep=self.keep, specialise=self.specialise)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,19 @@ class IteratedExtendedKalmanFilter:
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log."""
         iterations = max(self.max_iterations, 2)
-        return filter_problem(problem, self.name, iterations, keep=self.keep, form=self.form)
+        return filter_safely(problem, self.name, iterations, self.form, keep=self.keep)
+
+
+def filter_safely(
+    problem: Problem, name: str, iterations: int, form: str, *, keep: bool, specialise: bool = False
+) -> Run:
+    """Filter in a form; the default one gives way to UD where it ends in an indefinite covariance."""
+    if form != "joseph":
+        return filter_problem(problem, name, iterations, keep=keep, form=form)
+    return or_in_ud(
+        lambda: filter_problem(problem, name, iterations, keep=keep, specialise=specialise),
+        lambda: filter_problem(problem, name, iterations, keep=keep, form="ud"),
+    )
 
 
 def filter_problem(

@@ -11,15 +11,17 @@ All four give the same estimates, innovations and likelihood where double precis
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from sequential.errors import ModelError
+from sequential.errors import ModelError, NotPositiveDefiniteError
 from sequential.filters.specialised import Sizes, made_for
+from sequential.history import Run
 from sequential.timeline import Problem
 
-__all__ = ["FORMS", "kernel_of", "named", "require_form", "require_informed"]
+__all__ = ["FORMS", "kernel_of", "named", "or_in_ud", "require_form", "require_informed"]
 
 FORMS = ("joseph", "ud", "sqrt", "information")
 
@@ -62,6 +64,17 @@ def kernel_of(form: str, iterations: int, sizes: Sizes) -> Callable[..., tuple[f
 
     kernel = made_for(filter_log) if any(sizes) else filter_log
     return lambda a, b, mean, cov, keep, out: kernel(a, b, mean, cov, iterations, keep, out, *sizes)
+
+
+def or_in_ud(default: Callable[[], Run], in_ud: Callable[[], Run]) -> Run:
+    """What the default form finds, or UD form where rounding left that an indefinite covariance."""
+    try:
+        return default()
+    except NotPositiveDefiniteError as lost:
+        run = in_ud()
+        message = f"solved in UD form, since in the default form {lost.args[0].split(':')[0]}"
+        kept = f"{run.report.message}; {message}" if run.report.message else message
+        return replace(run, report=replace(run.report, message=kept))
 
 
 def require_informed(problem: Problem, form: str, failed: int, filtered: Any) -> None:

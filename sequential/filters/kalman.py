@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sequential.errors import ModelError, NonlinearModelError
 from sequential.filters.extended import filter_problem
-from sequential.filters.forms import named, require_form
+from sequential.filters.forms import named, or_in_ud, require_form
 from sequential.filters.linear import filter_linear_problem
 from sequential.history import Run
 from sequential.model import StateSpace
@@ -46,15 +46,15 @@ class KalmanFilter:
     def solve(self, problem: Problem) -> Run:
         """Filter the whole log; raises `NonlinearModelError` where the model is not linear."""
         require_linear(problem.model)
-        if self.form == "joseph":
-            return filter_linear_problem(
-                problem,
-                self.name,
-                keep=self.keep,
-                specialise=self.specialise,
-                freeze=self.freeze or 0.0,
-            )
-        return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
+        if self.form != "joseph":
+            return filter_problem(problem, self.name, 1, keep=self.keep, form=self.form)
+        name, keep, freeze = self.name, self.keep, self.freeze or 0.0
+        return or_in_ud(
+            lambda: filter_linear_problem(
+                problem, name, keep=keep, specialise=self.specialise, freeze=freeze
+            ),
+            lambda: filter_problem(problem, name, 1, keep=keep, form="ud"),
+        )
 
 
 def require_freeze(freeze: float | None, form: str) -> None:
