@@ -21,7 +21,7 @@ from sequential.manifold import Kind, Manifold
 from sequential.model import Functions, Plain, StateSpace, evaluate
 from sequential.timeline import sealed
 
-__all__ = ["Compiled", "built_in", "compiled", "made_for"]
+__all__ = ["Compiled", "built_in", "compiled", "made_for", "make"]
 
 Array = NDArray[np.float64]
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -161,6 +161,15 @@ def made_for(kernel: Any) -> Callable[..., tuple[float, int]]:
 
     made: Callable[..., tuple[float, int]] = njit(cache=True, error_model="numpy", nogil=True)(kernel.py_func)
     return made
+
+
+def make(kernel: Any, *sizes: int) -> None:
+    """Compile a kernel for sizes that its last arguments tell, unless it is in the cache."""
+    from numba import types
+
+    usual = kernel.signatures[0][: -len(sizes)]
+    made: Any = made_for(kernel)
+    made.compile((*usual, *(types.UniTuple(types.int64, size) for size in sizes)))
 
 
 @lru_cache(maxsize=256)

@@ -31,6 +31,7 @@ SMALL = (
     "sensing",
 )
 KERNELS = (
+    "linear sizes",
     "multiple",
     "extended",
     "online_extended",
@@ -96,8 +97,14 @@ def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> 
 
 
 def compile_kernel(name: str) -> None:
-    """Import one kernel, which compiles it."""
-    importlib.import_module(f"sequential.kernels.{name}")
+    """Import one kernel, which compiles it, and the linear one for common sizes too."""
+    module = importlib.import_module(f"sequential.kernels.{name.removesuffix(' sizes')}")
+    if name == "linear sizes":
+        from sequential.compile import make
+        from sequential.filters.specialised import COMMON
+
+        for sizes in COMMON:
+            make(module.filter_linear, *sizes)
 
 
 def compile_models(name: str) -> None:

@@ -26,16 +26,17 @@ class KalmanFilter:
     freeze : keep the gain once the covariance changes by less than this share of itself from reading to
         reading, such as 1e-12, until the rhythm of the readings changes: several times as quick on a long,
         even log.  Without effect with `keep`, or where an input drives the process
-    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
+    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`.
+        By default for the sizes of tracks on a line, in the plane and in space, which `make` compiles before
     """
 
     keep: bool = False
     form: str = "joseph"
     freeze: float | None = None
-    specialise: bool = False
+    specialise: bool | None = None
 
     def __post_init__(self) -> None:
-        require_form(self.form, specialise=self.specialise)
+        require_form(self.form, specialise=bool(self.specialise))
         require_freeze(self.freeze, self.form)
 
     @property

@@ -16,7 +16,7 @@ __all__ = ["filter_linear_problem"]
 
 
 def filter_linear_problem(
-    problem: Problem, name: str, *, keep: bool, specialise: bool, freeze: float = 0.0
+    problem: Problem, name: str, *, keep: bool, specialise: bool | None, freeze: float = 0.0
 ) -> Run:
     """Run the compiled linear filter and read its arrays."""
     from sequential.kernels.linear import filter_linear
@@ -29,7 +29,7 @@ def filter_linear_problem(
     driven = int(model.process_functions.inputs > 0)
     began = time.perf_counter()
     _, state, reading = sizes_of(whole.tables, specialise=specialise)
-    kernel = made_for(filter_linear) if specialise else filter_linear
+    kernel = made_for(filter_linear) if state or reading else filter_linear
     log_likelihood, failed = kernel(
         whole.tables, problem.schedule, model.prior.mean, model.prior.cov, driven, constant, int(keep),
         freeze, out, state, reading,

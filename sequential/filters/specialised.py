@@ -10,16 +10,22 @@ from typing import Any
 
 from sequential.compile import made_for
 
-__all__ = ["Sizes", "made_for", "sizes_of"]
+__all__ = ["COMMON", "Sizes", "made_for", "sizes_of"]
 
 Sizes = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 ANY: Sizes = ((), (), ())
+# state and reading of tracks on a line, in the plane and in space: what a linear filter is made for unasked
+COMMON = ((2, 1), (4, 2), (6, 3), (9, 3))
 
 
-def sizes_of(tables: Any, *, specialise: bool) -> Sizes:
-    """Storage, tangent and reading as tuples of that length, whose types tell the sizes to the compiler."""
-    if not specialise:
-        return ANY
+def sizes_of(tables: Any, *, specialise: bool | None) -> Sizes:
+    """Storage, tangent and reading as tuples of that length, whose types tell the sizes to the compiler.
+
+    With `specialise` None they are told where they are common ones.
+    """
     dims = set(tables.z_dim.tolist())
+    common = len(dims) == 1 and tables.n == tables.d and (tables.d, min(dims)) in COMMON
+    if not (common if specialise is None else specialise):
+        return ANY
     reading = (0,) * dims.pop() if len(dims) == 1 else ()
     return (0,) * tables.n, (0,) * tables.d, reading

@@ -32,11 +32,12 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
     `gain` holds Kᵀ (m, d), `lower` the Cholesky factor of S; `cross` (m, d) is scratch: H P, then the
     whitened residual in its first column.
     """
+    share = 1.0 / weight
     multiply(h, p, cross, m, d, d)
     multiply_nt(cross, h, innovation_cov, m, d, m)
     for i in range(m):
         for j in range(m):
-            innovation_cov[i, j] += noise[i, j] / weight
+            innovation_cov[i, j] += noise[i, j] * share
     symmetrise(innovation_cov, m)
     if cholesky(innovation_cov, lower, m, False) > 0:
         return -1.0, 0.0
@@ -66,6 +67,7 @@ def joseph(p, h, gain, noise, weight, m, d, out, projected, spread):
     Multiplied out as M - (M Hᵀ - K R/w) Kᵀ with M = P - K H P, which holds for any gain and costs no product
     of two (d, d) matrices (Bierman 1977, section V.2).
     """
+    share = 1.0 / weight
     multiply(h, p, projected, m, d, d)
     for i in range(d):
         for j in range(d):
@@ -78,7 +80,7 @@ def joseph(p, h, gain, noise, weight, m, d, out, projected, spread):
             for j in range(d):
                 s += out[i, j] * h[a, j]
             for k in range(m):
-                s -= gain[k, i] * noise[k, a] / weight
+                s -= gain[k, i] * noise[k, a] * share
             spread[i, a] = s
     sound = True
     for i in range(d):

@@ -136,11 +136,12 @@ def cholesky(a, lower, n, lenient):
             continue
         pivot = math.sqrt(s)
         lower[j, j] = pivot
+        inverse = 1.0 / pivot
         for i in range(j + 1, n):
             s = a[i, j]
             for k in range(j):
                 s -= lower[i, k] * lower[j, k]
-            lower[i, j] = s / pivot
+            lower[i, j] = s * inverse
     for i in range(n):
         for j in range(i + 1, n):
             lower[i, j] = 0.0
@@ -151,23 +152,23 @@ def cholesky(a, lower, n, lenient):
 def solve_lower(lower, b, n, p):
     """b (n, p) <- L⁻¹ b; rows of lost pivots become zero."""
     for i in range(n):
-        pivot = lower[i, i]
+        inverse = 1.0 / lower[i, i] if lower[i, i] > 0.0 else 0.0
         for k in range(i):
             s = lower[i, k]
             for j in range(p):
                 b[i, j] -= s * b[k, j]
         for j in range(p):
-            b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0
+            b[i, j] *= inverse
 
 
 @inlined_as(types.void(f2, w2, i0, i0))
 def solve_lower_transposed(lower, b, n, p):
     """b (n, p) <- L⁻ᵀ b; rows of lost pivots become zero."""
     for i in range(n - 1, -1, -1):
-        pivot = lower[i, i]
+        inverse = 1.0 / lower[i, i] if lower[i, i] > 0.0 else 0.0
         for k in range(i + 1, n):
             s = lower[k, i]
             for j in range(p):
                 b[i, j] -= s * b[k, j]
         for j in range(p):
-            b[i, j] = b[i, j] / pivot if pivot > 0.0 else 0.0
+            b[i, j] *= inverse

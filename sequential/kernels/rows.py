@@ -51,6 +51,7 @@ def push_rows(rows, q, d, work, p):
 def project_rows(rows, p, noise, weight, m, d, projected, innovation_cov):
     """H P (m, d), and S = H P Hᵀ + R/w (m, m)."""
     count, column, value = rows
+    share = 1.0 / weight
     for i in range(m):
         for j in range(d):
             projected[i, j] = 0.0
@@ -60,7 +61,7 @@ def project_rows(rows, p, noise, weight, m, d, projected, innovation_cov):
                 projected[i, j] += s * p[row, j]
     for i in range(m):
         for j in range(i + 1):
-            s = noise[i, j] / weight
+            s = noise[i, j] * share
             for k in range(count[j]):
                 s += value[j, k] * projected[i, column[j, k]]
             innovation_cov[i, j] = s
@@ -103,6 +104,7 @@ def update_rows(rows, p, noise, weight, m, d, projected, lower, gain, spread, wo
     Returns False where a variance came out negative.
     """
     count, column, value = rows
+    share = 1.0 / weight
     # first W = L⁻¹ H P in `gain`, with K r = Wᵀ L⁻¹ r
     for j in range(d):
         delta[j] = 0.0
@@ -133,7 +135,7 @@ def update_rows(rows, p, noise, weight, m, d, projected, lower, gain, spread, wo
             for k in range(count[a]):
                 s += value[a, k] * work[i, column[a, k]]
             for b in range(m):
-                s -= gain[b, i] * noise[b, a] / weight
+                s -= gain[b, i] * noise[b, a] * share
             spread[i, a] = s
     sound = True
     for i in range(d):
