@@ -14,7 +14,10 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # fuzz, exact, dense and worlds of the tests
+import sequential as sq
+
+# fuzz, exact, dense and worlds of the tests; after sequential, since the tests have a folder of that name
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 from measure import exactness, many_series, per_sample, start_up
 from measure.c_loops import Loop, compile_loops, linear_loop, planar_loop
@@ -24,8 +27,6 @@ from measure.figures import Figure, publish, say
 from measure.many_series import linear_model
 from measure.peers import FILTERS, SMOOTHERS
 from measure.planar_peers import EXTENDED, UNSCENTED
-
-import sequential as sq
 
 # axes, order, steps; must and aim against filterpy
 TRACKS = {
