@@ -71,20 +71,18 @@ def filter_series(
     ModelError, ShapeError, NonlinearModelError, NotPositiveDefiniteError
     """
     name, values, problem = _laid_out(model, t, z)
-    can = _why_not_shared(model, values) is None
-    if shared and not can:
-        raise ModelError(f"the series cannot share a covariance: {_why_not_shared(model, values)}")
+    obstacle = None if shared is False else _why_not_shared(model, values)
+    if shared and obstacle:
+        raise ModelError(f"the series cannot share a covariance: {obstacle}")
     threads = (os.cpu_count() or 1) if threads is None else max(1, threads)
-    if shared is not False and can:
-        from sequential.filters.series import by_gains
+    from sequential.filters.series import by_gains, each
 
+    if shared is not False and obstacle is None:
         found = by_gains(problem, values, _spread(len(values), threads), specialise=specialise)
         if found is not None:
             return SeriesRun(problem.t, *found, shared=True)
         if shared:
             raise ModelError("the series cannot share a covariance: an innovation covariance is in doubt")
-    from sequential.filters.series import each
-
     found = each(problem, values, _spread(len(values), threads), specialise=specialise)
     lost = np.flatnonzero(np.isnan(found[-1]))
     if len(lost):

@@ -9,7 +9,17 @@ from typing import Any
 
 import click
 
-__all__ = ["Command", "as_json", "command_line", "config_option", "print_json", "seed_option"]
+__all__ = [
+    "Command",
+    "as_json",
+    "check_option",
+    "command_line",
+    "config_option",
+    "max_gap_option",
+    "print_json",
+    "robot_option",
+    "seed_option",
+]
 
 Command = Callable[..., Any]
 
@@ -17,6 +27,16 @@ as_json = click.option(
     "--json", "as_json", is_flag=True, help="One JSON document on stdout, all else on stderr."
 )
 seed_option = click.option("--seed", type=int, default=0, show_default=True, help="Seed of resampled bands.")
+check_option = click.option("--check", is_flag=True, help="Exit with 3 when a finding is FAIL.")
+robot_option = click.option(
+    "--robot", type=int, metavar="N", help="Only this robot, where a dataset has several."
+)
+max_gap_option = click.option(
+    "--max-gap",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Longest pause of the input to bridge, s.",
+)
 
 
 def config_option(command: Command) -> Command:

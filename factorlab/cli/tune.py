@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import CHECK_FAILED, in_one_sentence
-from factorlab.cli.settings import as_json, command_line, config_option, print_json, seed_option
+from factorlab.cli.settings import (
+    as_json,
+    check_option,
+    command_line,
+    config_option,
+    max_gap_option,
+    print_json,
+    robot_option,
+    seed_option,
+)
 
 if TYPE_CHECKING:
     from factorlab.datasets import Dataset
@@ -81,13 +90,8 @@ class Settings:
     metavar="K",
     help="Use one reading in K, as compare does.  [default: 5 for a dataset, 1 for a log]",
 )
-@click.option("--robot", type=int, metavar="N", help="Only this robot, where a dataset has several.")
-@click.option(
-    "--max-gap",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="S",
-    help="Longest pause of the input to bridge, s.",
-)
+@robot_option
+@max_gap_option
 @as_json
 @click.option(
     "-o",
@@ -98,7 +102,7 @@ class Settings:
 )
 @click.option("--force", is_flag=True, help="Write over an earlier report in DIR.")
 @seed_option
-@click.option("--check", is_flag=True, help="Exit with 3 when a finding is FAIL.")
+@check_option
 @config_option
 @in_one_sentence
 def tune(**options: Any) -> int:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from sequential.compile import compiled
 from sequential.filters.forms import kernel_of, named, or_in_ud, require_form, require_informed
-from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.filters.solution import allocate, finished
 from sequential.filters.specialised import sizes_of
-from sequential.history import Report, Run
+from sequential.history import Run
 from sequential.timeline import Problem
 
 __all__ = ["ExtendedKalmanFilter", "IteratedExtendedKalmanFilter"]
@@ -105,8 +105,4 @@ def filter_problem(
     seconds = time.perf_counter() - began
     whole.raise_failures()
     require_informed(problem, form, failed, out)
-    require_solved(problem, failed, out)
-    require_finite(problem, out.mean)
-    rejected = int((out.accepted == 0).sum())
-    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
-    return as_run(problem, out, log_likelihood, report, keep=keep)
+    return finished(problem, whole, out, name, (log_likelihood, failed, seconds), keep=keep)

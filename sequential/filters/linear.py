@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sequential.compile import compiled
-from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.filters.solution import allocate, finished
 from sequential.filters.specialised import made_for, sizes_of
-from sequential.history import Report, Run
+from sequential.history import Run
+from sequential.model import StateSpace
 from sequential.timeline import Problem, sealed
 
-__all__ = ["filter_linear_problem"]
+__all__ = ["filter_linear_problem", "without_context"]
 
 
 def filter_linear_problem(
@@ -24,7 +26,7 @@ def filter_linear_problem(
 
     whole, model = compiled(problem.model), problem.model
     out = Filtered(*allocate(problem, whole.tables, keep=keep))
-    constant = sealed(np.array([f.inputs == 0 for f in model.sensor_functions.values()], dtype=np.int64))
+    constant = without_context(model)
     freeze = 0.0 if keep or model.process_functions.inputs else freeze
     driven = int(model.process_functions.inputs > 0)
     began = time.perf_counter()
@@ -35,9 +37,9 @@ def filter_linear_problem(
         freeze, out, state, reading,
     )  # fmt: skip
     seconds = time.perf_counter() - began
-    whole.raise_failures()
-    require_solved(problem, failed, out)
-    require_finite(problem, out.mean)
-    rejected = int((out.accepted == 0).sum())
-    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
-    return as_run(problem, out, log_likelihood, report, keep=keep)
+    return finished(problem, whole, out, name, (log_likelihood, failed, seconds), keep=keep)
+
+
+def without_context(model: StateSpace) -> NDArray[np.int64]:
+    """(S,) 1 for the sensors whose matrix is the same at every reading."""
+    return sealed(np.array([f.inputs == 0 for f in model.sensor_functions.values()], dtype=np.int64))

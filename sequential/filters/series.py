@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.compile import compiled
-from sequential.filters.linear import filter_linear_problem
+from sequential.filters.linear import filter_linear_problem, without_context
 from sequential.filters.specialised import made_for, sizes_of
 from sequential.log import SensorLog, Stream
 from sequential.model import evaluate
+from sequential.readings import ReadingNoise
 from sequential.timeline import Problem, prepare, sealed
 
 __all__ = ["by_gains", "each"]
 
 Array = NDArray[np.float64]
 Spread = Callable[[Callable[[int, int], None]], None]
-DOUBTFUL = 1e-9  # as in kernels.correcting: below it an update is redone in UD form, which gives no gain
 Found = tuple[Array, Array, Array, Array, Array]
 
 
@@ -29,18 +29,16 @@ def each(problem: Problem, z: Array, spread: Spread, *, specialise: bool) -> Fou
 
     whole, prior, m = compiled(problem.model), problem.model.prior, z.shape[2]
     patterns, row = patterns_of(~np.isnan(z))
-    table = noise_table(problem, patterns)
-    plan = problem.schedule._replace(noise_cov=table)
+    rows = sealed(patterns.sum(axis=1)[row].astype(np.int64))
+    noise = ReadingNoise(np.zeros(len(patterns), dtype=np.int64), patterns, None, row, rows)
+    plan = problem.schedule._replace(noise_cov=sealed(noise.table(problem.model)))
     nodes, n, d = len(problem.t), whole.tables.n, whole.tables.d
     count, readings = z.shape[:2]
     mean, cov = np.empty((count, nodes, n)), np.empty((count, nodes, d, d))
     residual, spread_of = np.zeros((count, readings, m)), np.zeros((count, readings, m, m))
     spread_of[...] = np.eye(m)
     accepted, found = np.ones((count, readings), dtype=np.int64), np.empty(count)
-    constant = sealed(
-        np.array([f.inputs == 0 for f in problem.model.sensor_functions.values()], dtype=np.int64)
-    )
-    rows = sealed(patterns.sum(axis=1)[row].astype(np.int64))
+    constant = without_context(problem.model)
     _, state, reading = sizes_of(whole.tables, specialise=specialise)
     kernel: Any = made_for(filter_each) if specialise else filter_each
     values = sealed(z)
@@ -58,6 +56,7 @@ def each(problem: Problem, z: Array, spread: Spread, *, specialise: bool) -> Fou
 
 def by_gains(problem: Problem, z: Array, spread: Spread, *, specialise: bool) -> Found | None:
     """The same from one recursion of the covariance; None where an innovation covariance is in doubt."""
+    from sequential.kernels.correcting import DOUBTFUL
     from sequential.kernels.series import filter_by_gains
 
     model = problem.model
@@ -74,7 +73,7 @@ def by_gains(problem: Problem, z: Array, spread: Spread, *, specialise: bool) ->
     lower = np.linalg.cholesky(used.cov) if len(at) else np.zeros((0, m, m))
     pivots = np.diagonal(lower, axis1=1, axis2=2) ** 2 / np.diagonal(used.cov, axis1=1, axis2=2)
     if len(at) and pivots.min() < DOUBTFUL:
-        return None
+        return None  # such an update is redone in UD form, which gives no gain
     # every stamp has a row here; those without a reading have a gain of zero
     row = np.searchsorted(problem.reading_t, used.t)
     readings = len(problem.reading_t)
@@ -124,13 +123,3 @@ def patterns_of(present: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[
     powers = 1 << np.arange(present.shape[2], dtype=np.int64)
     codes, row = np.unique(present @ powers, return_inverse=True)
     return (codes[:, None] & powers) > 0, row.reshape(present.shape[:2]).astype(np.int64)
-
-
-def noise_table(problem: Problem, patterns: NDArray[np.bool_]) -> Array:
-    """(T, m, m) noise of each pattern; a missing component has a unit variance of its own."""
-    sensor = next(iter(problem.model.sensors.values()))
-    both = patterns[:, :, None] & patterns[:, None, :]
-    cov = np.where(both, sensor.noise_cov, 0.0)
-    each_one = np.arange(patterns.shape[1])
-    cov[:, each_one, each_one] += ~patterns
-    return sealed(cov)

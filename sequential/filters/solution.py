@@ -9,11 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sequential.compile import Compiled
 from sequential.errors import NotFiniteError, NotPositiveDefiniteError
 from sequential.history import Innovations, Prediction, Report, Run
 from sequential.timeline import Problem
 
-__all__ = ["allocate", "as_run", "collect_innovations", "masked", "require_finite", "require_solved"]
+__all__ = [
+    "allocate",
+    "as_run",
+    "collect_innovations",
+    "finished",
+    "masked",
+    "require_finite",
+    "require_solved",
+]
 
 
 def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:
@@ -131,3 +140,22 @@ def as_run(problem: Problem, filtered: Any, log_likelihood: float, report: Repor
         report,
         predicted,
     )
+
+
+def finished(
+    problem: Problem, whole: Compiled, out: Any, name: str, ended: tuple[float, int, float], *, keep: bool
+) -> Run:
+    """The `Run` of a kernel that ended with (log likelihood, where it failed or -1, seconds).
+
+    Raises
+    ------
+    NotFiniteError, NotPositiveDefiniteError
+        where it failed, and whatever an interpreted model function raised.
+    """
+    log_likelihood, failed, seconds = ended
+    whole.raise_failures()
+    require_solved(problem, failed, out)
+    require_finite(problem, out.mean)
+    rejected = int((out.accepted == 0).sum())
+    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
+    return as_run(problem, out, log_likelihood, report, keep=keep)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from sequential.compile import compiled
 from sequential.errors import ModelError
 from sequential.filters.sigma_sets import SigmaSet
-from sequential.filters.solution import allocate, as_run, require_finite, require_solved
+from sequential.filters.solution import allocate, finished
 from sequential.filters.specialised import made_for, sizes_of
-from sequential.history import Report, Run
+from sequential.history import Run
 from sequential.timeline import Problem, sealed
 
 __all__ = ["CubatureKalmanFilter", "UnscentedKalmanFilter"]
@@ -112,9 +112,4 @@ def filter_points(
         *sizes_of(whole.tables, specialise=specialise),
     )  # fmt: skip
     seconds = time.perf_counter() - began
-    whole.raise_failures()
-    require_solved(problem, failed, out)
-    require_finite(problem, out.mean)
-    rejected = int((out.accepted == 0).sum())
-    report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
-    return as_run(problem, out, log_likelihood, report, keep=keep)
+    return finished(problem, whole, out, name, (log_likelihood, failed, seconds), keep=keep)

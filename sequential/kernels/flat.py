@@ -5,7 +5,7 @@ from __future__ import annotations
 from sequential.kernels.call import inlined
 from sequential.kernels.charts import local, retract, wrap
 
-__all__ = ["GENERAL", "local_reading", "local_state", "retract_state"]
+__all__ = ["GENERAL", "local_reading", "retract_state"]
 
 GENERAL, ANGLES, PLAIN = 0, 1, 2  # anything; blocks of numbers and angles; one block of numbers
 
@@ -18,16 +18,6 @@ def retract_state(model, x, x_at, xi, xi_at, out, out_at):
             out[out_at + i] = x[x_at + i] + xi[xi_at + i]
     else:
         retract(model.table, 0, len(model.table), x, x_at, xi, xi_at, out, out_at)
-
-
-@inlined
-def local_state(model, x, x_at, y, y_at, out, out_at):
-    """out = the tangent vector at x that leads to y."""
-    if model.flat == PLAIN:
-        for i in range(model.n):
-            out[out_at + i] = y[y_at + i] - x[x_at + i]
-    else:
-        local(model.table, 0, len(model.table), x, x_at, y, y_at, out, out_at)
 
 
 @inlined

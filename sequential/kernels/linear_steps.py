@@ -14,7 +14,7 @@ from sequential.kernels.belief import LOG_TWO_PI, admit
 from sequential.kernels.call import call, inlined, owning
 from sequential.kernels.correcting import DOUBTFUL, doubt_scratch, redo
 from sequential.kernels.matrices import copy_matrix, fill_diagonal, multiply
-from sequential.kernels.rows import factor_innovation, gather_rows, project_rows, push_rows, update_rows
+from sequential.kernels.rows import factor_innovation, gather_rows, project_rows, update_rows
 from sequential.kernels.sensing import loss_weight
 
 __all__ = ["absorb", "expect", "linear_scratch", "move"]
@@ -134,7 +134,7 @@ def move(model, plan, node, x, p, phi, d, driven, last, steps, work, keep):
             after[i] = total
         for i in range(d):
             x[i] = after[i]
-        push_rows(rows, noise, d, work, p)
+        project_rows(rows, p, noise, 1.0, d, d, work, p)
         if keep != 0:
             multiply(matrix, phi, work, d, d, d)
             copy_matrix(work, phi)

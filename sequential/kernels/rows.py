@@ -10,7 +10,7 @@ import math
 
 from sequential.kernels.call import inlined
 
-__all__ = ["factor_innovation", "gather_rows", "project_rows", "push_rows", "update_rows"]
+__all__ = ["factor_innovation", "gather_rows", "project_rows", "update_rows"]
 
 
 @inlined
@@ -28,28 +28,8 @@ def gather_rows(matrix, r, c, rows):
 
 
 @inlined
-def push_rows(rows, q, d, work, p):
-    """P <- F P Fᵀ + Q, exactly symmetric."""
-    count, column, value = rows
-    for i in range(d):
-        for j in range(d):
-            work[i, j] = 0.0
-        for k in range(count[i]):
-            s, row = value[i, k], column[i, k]
-            for j in range(d):
-                work[i, j] += s * p[row, j]
-    for i in range(d):
-        for j in range(i + 1):
-            s = q[i, j]
-            for k in range(count[j]):
-                s += value[j, k] * work[i, column[j, k]]
-            p[i, j] = s
-            p[j, i] = s
-
-
-@inlined
 def project_rows(rows, p, noise, weight, m, d, projected, innovation_cov):
-    """H P (m, d), and S = H P Hᵀ + R/w (m, m)."""
+    """H P (m, d), and S = H P Hᵀ + R/w (m, m), exactly symmetric, which may take the place of P."""
     count, column, value = rows
     share = 1.0 / weight
     for i in range(m):

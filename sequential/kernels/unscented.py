@@ -18,6 +18,7 @@ from sequential.kernels.arrays import f1, f2
 from sequential.kernels.belief import LOG_TWO_PI, admit
 from sequential.kernels.bierman import BIERMAN_VECTORS, update_covariance_ud
 from sequential.kernels.call import bare, call, inlined
+from sequential.kernels.correcting import DOUBTFUL
 from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply
 from sequential.kernels.records import FILTERED, FINISHED, MODEL, SCHEDULE
 from sequential.kernels.sensing import loss_weight
@@ -35,8 +36,6 @@ from sequential.kernels.sigma_points import (
 from sequential.kernels.sizes import ANY_SIZE, reading_dim, sized
 
 __all__ = ["filter_sigma_points"]
-
-DOUBTFUL = 1e-9  # a pivot of S below this share of its diagonal has lost as many digits
 
 
 @inlined
