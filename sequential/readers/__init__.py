@@ -1,7 +1,8 @@
 """Files become logs and trajectories here; whatever leaves this room is in SI units."""
 
+from sequential.readers.broad import BroadTruth, read_broad
 from sequential.readers.files import replacing
 from sequential.readers.table import read_log, write_log
 from sequential.readers.tum import read_tum, write_tum
 
-__all__ = ["read_log", "read_tum", "replacing", "write_log", "write_tum"]
+__all__ = ["BroadTruth", "read_broad", "read_log", "read_tum", "replacing", "write_log", "write_tum"]

@@ -12,7 +12,7 @@ from sequential.errors import DataError, FileFormatError, MissingStreamError
 from sequential.log import SensorLog, Stream
 from sequential.readers.files import replacing
 
-__all__ = ["read_npz", "write_npz"]
+__all__ = ["read_arrays", "read_npz", "write_npz"]
 
 
 def read_npz(path: str | os.PathLike[str]) -> dict[str, Stream]:
@@ -24,7 +24,7 @@ def read_npz(path: str | os.PathLike[str]) -> dict[str, Stream]:
         naming the array.
     """
     name = os.fspath(path)
-    arrays = _arrays(name)
+    arrays = read_arrays(name)
     streams = {}
     for key in arrays:
         stream = key.removesuffix("_t")
@@ -41,7 +41,8 @@ def read_npz(path: str | os.PathLike[str]) -> dict[str, Stream]:
     return streams
 
 
-def _arrays(name: str) -> dict[str, Any]:
+def read_arrays(name: str) -> dict[str, Any]:
+    """Every array of an archive; raises `FileFormatError` where it is none."""
     try:
         with np.load(name, allow_pickle=False) as archive:
             return {key: archive[key] for key in archive.files}
