@@ -19,7 +19,8 @@ def test_units_and_shapes(trial):
     assert imu.rate == pytest.approx(2000 / 7, rel=1e-6)
     assert len(imu) == len(truth.movement) == 56940
     still = ~truth.movement
-    assert np.linalg.norm(imu.accel[still], axis=1).mean() == pytest.approx(9.81, abs=0.05)
+    # this accelerometer is 0.8 % too long
+    assert np.linalg.norm(imu.accel[still], axis=1).mean() == pytest.approx(9.81, abs=0.15)
     assert np.abs(imu.gyro[still]).max() < 0.5
     assert 30 < np.median(np.linalg.norm(imu.mag, axis=1)) < 70
 
