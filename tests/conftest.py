@@ -77,6 +77,15 @@ def browser() -> Path:
     return Path(found)
 
 
+@pytest.fixture(scope="session")
+def c_compiler() -> str:
+    """A compiler of C99."""
+    found = shutil.which("gcc") or shutil.which("cc")
+    if found is None:
+        pytest.skip("needs a C compiler: install Debian's gcc")
+    return found
+
+
 # --- no silent skips: where FACTORLAB_NO_SKIP is set, a skip is a failure that gives the skip's reason ---
 
 

@@ -7,7 +7,9 @@
 (100, 1.99, True)
 """
 
+from sequential.sensors.calibration import AffineCalibration, ImuCalibration
+from sequential.sensors.calibration_files import c_header, kalibr_yaml
 from sequential.sensors.finding import Finding
 from sequential.sensors.recording import ImuRecording
 
-__all__ = ["Finding", "ImuRecording"]
+__all__ = ["AffineCalibration", "Finding", "ImuCalibration", "ImuRecording", "c_header", "kalibr_yaml"]
