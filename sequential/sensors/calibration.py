@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sequential.errors import DataError, FileFormatError, NotFiniteError, ShapeError
 from sequential.noise import require_covariance
 from sequential.readers.files import read_text, replacing
+from sequential.sensors.recording import SI, ImuRecording
 
 __all__ = ["KINDS", "SCHEMA", "SCHEMA_VERSION", "AffineCalibration", "ImuCalibration"]
 
@@ -33,7 +34,7 @@ class AffineCalibration:
     offset : (3,) reading where the quantity is zero, unit_in
     cov : (12, 12) covariance of the matrix, row by row, then the offset; None where it is unknown
     kind : "accel", "gyro" or "mag"
-    unit_in, unit_out : for instance "LSB" and "m/s^2"
+    unit_in, unit_out : for instance "counts" and "m/s^2", as a recording names them
     residual_rms : what the fit left over, in unit_out; None where nothing was left to look at
     source : the recording or the work that it comes from
 
@@ -77,8 +78,8 @@ class AffineCalibration:
 
     def raw(self, calibrated: ArrayLike) -> Array:
         """The way back: what the sensor would have read, (..., 3) in unit_in."""
-        back: Array = np.linalg.solve(self.matrix, self._readings(calibrated)[..., None])[..., 0]
-        return back + self.offset
+        back: Array = self._readings(calibrated) @ np.linalg.inv(self.matrix).T + self.offset
+        return back
 
     def _readings(self, given: ArrayLike) -> Array:
         own = np.asarray(given, dtype=np.float64)  # int16 counts must not wrap round
@@ -86,7 +87,7 @@ class AffineCalibration:
             raise ShapeError(f"readings of the {self.kind} must have shape (..., 3), got {own.shape}")
         return own
 
-    def with_counts(self, scale: float, unit: str = "LSB") -> AffineCalibration:
+    def with_counts(self, scale: float, unit: str = "counts") -> AffineCalibration:
         """The same calibration for readings before their nominal scale: raw = scale * counts.
 
         A driver reads counts, and a firmware wants one multiplication instead of two.
@@ -171,6 +172,28 @@ class ImuCalibration:
     def merged(self, other: ImuCalibration) -> ImuCalibration:
         """A bundle of these, with whatever `other` has taking the place of what is here."""
         return ImuCalibration(other.accel or self.accel, other.gyro or self.gyro, other.mag or self.mag)
+
+    def apply(self, recording: ImuRecording) -> ImuRecording:
+        """The recording with every sensor calibrated that has a calibration here.
+
+        Raises
+        ------
+        DataError
+            where the recording's unit is not the one that the calibration was made for.
+        """
+        changed: dict[str, Any] = {}
+        for one in self.present:
+            raw, unit = getattr(recording, one.kind), getattr(recording, f"{one.kind}_unit")
+            if raw is None:
+                continue
+            if unit != one.unit_in:
+                raise DataError(
+                    f"the {one.kind} of recording {recording.name!r} is in {unit}, its calibration takes "
+                    f"{one.unit_in}: read it as the calibration's recording was read, or use with_counts()"
+                )
+            known = one.unit_out == SI[one.kind]
+            changed |= {one.kind: one.apply(raw), f"{one.kind}_unit": one.unit_out if known else unit}
+        return replace(recording, **changed)
 
     def to_json(self) -> str:
         """One JSON object with the version of its schema."""

@@ -5,13 +5,13 @@ import pytest
 import yaml
 
 from sequential.errors import DataError, FileFormatError, NotFiniteError, ShapeError
-from sequential.sensors import AffineCalibration, ImuCalibration, c_header, kalibr_yaml
+from sequential.sensors import AffineCalibration, ImuCalibration, ImuRecording, c_header, kalibr_yaml
 
 
 def some(rng, kind="accel", *, cov=True):
     matrix = np.diag(rng.uniform(0.5, 2.0, 3)) @ (np.eye(3) + 0.05 * rng.standard_normal((3, 3)))
     root = rng.standard_normal((12, 12))
-    units = {"accel": ("LSB", "m/s^2"), "gyro": ("LSB", "rad/s"), "mag": ("LSB", "uT")}[kind]
+    units = {"accel": ("counts", "m/s^2"), "gyro": ("counts", "rad/s"), "mag": ("counts", "uT")}[kind]
     return AffineCalibration(
         matrix, rng.standard_normal(3), root @ root.T if cov else None, kind, *units, 0.01, "a file"
     )
@@ -102,11 +102,25 @@ def test_counts_take_the_nominal_scale_in(rng):
     np.testing.assert_allclose(there @ by_count.cov @ there.T, here @ one.cov @ here.T, rtol=1e-10)
 
 
+def test_a_bundle_calibrates_a_recording(rng):
+    imu = ImuCalibration(some(rng), some(rng, "gyro"))
+    counts = rng.integers(-1000, 1000, (20, 6)).astype(float)
+    raw = ImuRecording(
+        np.arange(20) * 0.01, counts[:, :3], counts[:, 3:], accel_unit="counts", gyro_unit="counts"
+    )
+    done = imu.apply(raw)
+    np.testing.assert_array_equal(done.accel, imu.accel.apply(counts[:, :3]))
+    np.testing.assert_array_equal(done.gyro, imu.gyro.apply(counts[:, 3:]))
+    assert (done.accel_unit, done.gyro_unit) == ("m/s^2", "rad/s")
+    with pytest.raises(DataError, match="takes counts"):
+        imu.apply(done)
+
+
 def test_c_header_compiles_and_calibrates(rng, tmp_path, c_compiler):
     imu = ImuCalibration(some(rng), some(rng, "gyro"), some(rng, "mag"))
     text = c_header(imu, source="a */ trap\nof two lines")
     assert text.count("struct") == 6
-    assert "m/s^2 per LSB" in text
+    assert "m/s^2 per counts" in text
     (tmp_path / "calibration.h").write_text(text)
     (tmp_path / "t.c").write_text(
         '#include "calibration.h"\n#include "calibration.h"\n#include <stdio.h>\nint main(void) {\n'
