@@ -1,6 +1,7 @@
 """How good an estimate is, and whether it knows: NIS, NEES, whiteness, ATE, RPE."""
 
 from sequential.evaluate.alignment import Alignment, align, umeyama
+from sequential.evaluate.attitude_error import AttitudeError, attitude_error, attitude_nees
 from sequential.evaluate.blame import Blame, Candidate, blame
 from sequential.evaluate.bootstrap import BootstrapBand, block_bootstrap, gap_labels
 from sequential.evaluate.consistency import (
@@ -22,6 +23,7 @@ from sequential.evaluate.whiteness import Whiteness, autocorrelation, whiteness
 
 __all__ = [
     "Alignment",
+    "AttitudeError",
     "AverageNees",
     "Blame",
     "BootstrapBand",
@@ -38,6 +40,8 @@ __all__ = [
     "anees",
     "ape",
     "associate",
+    "attitude_error",
+    "attitude_nees",
     "autocorrelation",
     "blame",
     "block_bootstrap",
