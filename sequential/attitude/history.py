@@ -106,4 +106,5 @@ class AttitudeHistory:
         if self.cov is None:
             return None
         rates = euler_rates(self.roll_pitch_yaw())
-        return np.sqrt(np.asarray(np.einsum("nij,njk,nik->ni", rates, self.cov, rates)))
+        variances: Array = np.einsum("nij,njk,nik->ni", rates, self.cov, rates)
+        return np.sqrt(variances)
