@@ -1,15 +1,35 @@
 """What a sensor records and what is wrong with it: recordings, their health, characterisation, calibration.
 
 >>> import numpy as np
->>> from sequential.sensors import ImuRecording
->>> still = ImuRecording(t=np.arange(200) * 0.01, accel=np.tile([0.0, 0.0, 9.81], (200, 1)))
->>> round(still.rate), round(still.duration, 2), still.mag is None
-(100, 1.99, True)
+>>> from sequential.sensors import ImuErrors, simulate_imu, still
+>>> errors = ImuErrors(gyro_bias=(0.01, 0.0, 0.0))
+>>> imu, truth = simulate_imu(still(2.0), np.random.default_rng(1), errors=errors)
+>>> round(imu.rate), imu.gyro[0].tolist(), imu.accel[0].round(3).tolist()
+(100, [0.01, 0.0, 0.0], [0.0, 0.0, 9.807])
 """
 
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import c_header, kalibr_yaml
 from sequential.sensors.finding import Finding
+from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, still, tumble, waypoints
 from sequential.sensors.recording import ImuRecording
+from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simulate_imu
 
-__all__ = ["AffineCalibration", "Finding", "ImuCalibration", "ImuRecording", "c_header", "kalibr_yaml"]
+__all__ = [
+    "SIX_POSITIONS",
+    "AffineCalibration",
+    "Finding",
+    "ImuCalibration",
+    "ImuErrors",
+    "ImuRecording",
+    "ImuSimulation",
+    "ImuTruth",
+    "Motion",
+    "c_header",
+    "constant_rate",
+    "kalibr_yaml",
+    "simulate_imu",
+    "still",
+    "tumble",
+    "waypoints",
+]

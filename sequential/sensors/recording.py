@@ -100,7 +100,9 @@ class ImuRecording:
         return tuple(name for name in SI if getattr(self, name) is not None)
 
     def require(self, *sensors: str, si: bool = True) -> ImuRecording:
-        """Give the recording itself where it holds these sensors, in SI units (µT) unless told otherwise.
+        """Give the recording itself where it holds these sensors, inertial ones in SI unless told otherwise.
+
+        A magnetometer passes in any unit: a heading needs no scale.
 
         Raises
         ------
@@ -113,7 +115,7 @@ class ImuRecording:
                     f"{', '.join(self.sensors)}"
                 )
                 raise MissingStreamError(msg)
-            if si and (unit := getattr(self, f"{sensor}_unit")) != SI[sensor]:
+            if si and sensor != "mag" and (unit := getattr(self, f"{sensor}_unit")) != SI[sensor]:
                 msg = (
                     f"{sensor} of recording {self.name!r} is in {unit}, {SI[sensor]} is needed here; "
                     f"calibrate it first, or give the scale with read_imu(…, units={{'{sensor}': …}})"
