@@ -1,9 +1,9 @@
 """What a sensor records and what is wrong with it: recordings, their health, characterisation, calibration.
 
 >>> import numpy as np
->>> from sequential.sensors import ImuErrors, simulate_imu, still
+>>> from sequential.sensors import ImuErrors, simulate_imu, stationary
 >>> errors = ImuErrors(gyro_bias=(0.01, 0.0, 0.0))
->>> imu, truth = simulate_imu(still(2.0), np.random.default_rng(1), errors=errors)
+>>> imu, truth = simulate_imu(stationary(2.0), np.random.default_rng(1), errors=errors)
 >>> round(imu.rate), imu.gyro[0].tolist(), imu.accel[0].round(3).tolist()
 (100, [0.01, 0.0, 0.0], [0.0, 0.0, 9.807])
 """
@@ -11,7 +11,7 @@
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import c_header, kalibr_yaml
 from sequential.sensors.finding import Finding
-from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, still, tumble, waypoints
+from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, stationary, tumble, waypoints
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simulate_imu
 
@@ -29,7 +29,7 @@ __all__ = [
     "constant_rate",
     "kalibr_yaml",
     "simulate_imu",
-    "still",
+    "stationary",
     "tumble",
     "waypoints",
 ]

@@ -18,7 +18,7 @@ from sequential.manifold.quaternion import (
 )
 from sequential.manifold.so3 import right_jacobian
 
-__all__ = ["SIX_POSITIONS", "Motion", "constant_rate", "still", "tumble", "waypoints"]
+__all__ = ["SIX_POSITIONS", "Motion", "constant_rate", "stationary", "tumble", "waypoints"]
 
 Array = NDArray[np.float64]
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -47,7 +47,7 @@ class Motion:
             raise DataError(msg)
 
 
-def still(duration: float, world_q_body: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> Motion:
+def stationary(duration: float, world_q_body: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> Motion:
     """Rest for `duration` seconds."""
     q = np.asarray(world_q_body, dtype=np.float64)
     return Motion(

@@ -11,13 +11,13 @@ from sequential.sensors import (
     ImuErrors,
     constant_rate,
     simulate_imu,
-    still,
+    stationary,
     tumble,
     waypoints,
 )
 
 MOTIONS = {
-    "still": lambda _: still(10.0, (0.5, 0.5, 0.5, 0.5)),
+    "still": lambda _: stationary(10.0, (0.5, 0.5, 0.5, 0.5)),
     "constant": lambda _: constant_rate(10.0, (0.3, -1.0, 2.0)),
     "six": lambda _: waypoints(SIX_POSITIONS, dwell=1.0, travel=0.8),
     "tumble": lambda rng: tumble(10.0, rng, angle=1.0),
@@ -88,7 +88,7 @@ def test_errors_are_those_declared(rng):
 
 def test_white_noise_and_walk_have_the_declared_size(rng):
     noise = ImuNoise(0.001, 0.02, 0.01, 0.0)
-    imu, truth = simulate_imu(still(2000.0), rng, rate=50.0, errors=ImuErrors(noise=noise), field=None)
+    imu, truth = simulate_imu(stationary(2000.0), rng, rate=50.0, errors=ImuErrors(noise=noise), field=None)
     white = imu.gyro - truth.gyro_bias
     np.testing.assert_allclose(white.std(axis=0), 0.001 * np.sqrt(50.0), rtol=0.02)
     np.testing.assert_allclose((imu.accel - truth.specific_force).std(axis=0), 0.02 * 50**0.5, rtol=0.02)
@@ -109,7 +109,7 @@ def test_disturbance_and_jitter(rng):
     def near_iron(t):
         return np.where((t > 2.0)[:, None], [10.0, 0.0, 0.0], 0.0)
 
-    imu, truth = simulate_imu(still(5.0), rng, disturbance=near_iron, jitter=0.001)
+    imu, truth = simulate_imu(stationary(5.0), rng, disturbance=near_iron, jitter=0.001)
     assert imu.mag[-1, 0] == pytest.approx(10.0)
     assert 0.0005 < imu.dt.std() < 0.003
     np.testing.assert_array_equal(imu.t, truth.t)
@@ -117,10 +117,10 @@ def test_disturbance_and_jitter(rng):
 
 def test_bad_settings():
     with pytest.raises(DataError, match="must be positive"):
-        simulate_imu(still(1.0), np.random.default_rng(0), rate=0.0)
+        simulate_imu(stationary(1.0), np.random.default_rng(0), rate=0.0)
     with pytest.raises(DataError, match="positive number of seconds"):
-        still(-1.0)
+        stationary(-1.0)
     with pytest.raises(ShapeError, match="3 components"):
-        simulate_imu(still(1.0), np.random.default_rng(0), errors=ImuErrors(gyro_bias=(1.0, 2.0)))
+        simulate_imu(stationary(1.0), np.random.default_rng(0), errors=ImuErrors(gyro_bias=(1.0, 2.0)))
     with pytest.raises(ShapeError, match="quaternions"):
         waypoints(np.zeros((2, 3)))
