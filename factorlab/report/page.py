@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -16,6 +15,7 @@ from factorlab.report.consistency_figures import autocorrelations, innovations_o
 from factorlab.report.cost_figure import cost
 from factorlab.report.motion_figures import envelopes, errors_over_time, sigmas, trajectory
 from factorlab.report.style import inline_svg
+from factorlab.report.template import fill
 
 __all__ = ["render"]
 
@@ -84,16 +84,12 @@ PLOTS = (
 
 def render(comparisons: tuple[Comparison, ...], document: dict[str, Any]) -> str:
     """The whole page as text."""
-    environment = Environment(
-        loader=PackageLoader("factorlab", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals.update(figure=figure, band=band, cells=cells)
-    template = environment.get_template("report.html.j2")
-    return template.render(
+    return fill(
+        "report.html.j2",
+        lang="en",
+        figure=figure,
+        band=band,
+        cells=cells,
         runs=[_run(comparison, index) for index, comparison in enumerate(comparisons)],
         title=", ".join(comparison.name for comparison in comparisons),
         document=document,
