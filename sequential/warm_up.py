@@ -64,6 +64,9 @@ MODELS = (
     "linear",
     "exponential",
 )
+# loops that live beside the Python they serve
+BESIDE = ("sensors.allan_kernel",)
+ROOMS = (*KERNELS, *BESIDE, *MODELS)
 
 
 def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> None:
@@ -79,9 +82,9 @@ def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> 
     ModelError
         where there is no such room.
     """
-    wanted = rooms or (*KERNELS, *MODELS)
-    if unknown := [room for room in wanted if room not in (*KERNELS, *MODELS)]:
-        msg = f"there is nothing to compile in {unknown[0]!r}; there are {', '.join((*KERNELS, *MODELS))}"
+    wanted = rooms or ROOMS
+    if unknown := [room for room in wanted if room not in ROOMS]:
+        msg = f"there is nothing to compile in {unknown[0]!r}; there are {', '.join(ROOMS)}"
         raise ModelError(msg)
     for name in SMALL:
         importlib.import_module(f"sequential.kernels.{name}")
@@ -91,6 +94,7 @@ def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> 
         # in the order of KERNELS, the longest first
         jobs = {pool.submit(compile_kernel, name): f"kernel {name}" for name in KERNELS if name in wanted}
         jobs |= {pool.submit(compile_models, name): f"models {name}" for name in MODELS if name in wanted}
+        jobs |= {pool.submit(compile_loops, name): f"loops {name}" for name in BESIDE if name in wanted}
         for job in as_completed(jobs):
             job.result()
             progress(jobs[job])
@@ -115,6 +119,11 @@ def compile_models(name: str) -> None:
     for function in vars(module).values():
         if is_raw(function) and function.__module__ == module.__name__:
             built_in(function, getattr(module, "HELPERS", ()))
+
+
+def compile_loops(name: str) -> None:
+    """Import loops that live beside their Python, which compiles them."""
+    importlib.import_module(f"sequential.{name}")
 
 
 def is_raw(function: Any) -> bool:

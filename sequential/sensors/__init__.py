@@ -8,6 +8,7 @@
 (100, [0.01, 0.0, 0.0], [0.0, 0.0, 9.807])
 """
 
+from sequential.sensors.allan import AllanDeviation, allan_deviation
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import c_header, kalibr_yaml
 from sequential.sensors.finding import Finding
@@ -18,6 +19,7 @@ from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simu
 __all__ = [
     "SIX_POSITIONS",
     "AffineCalibration",
+    "AllanDeviation",
     "Finding",
     "ImuCalibration",
     "ImuErrors",
@@ -25,6 +27,7 @@ __all__ = [
     "ImuSimulation",
     "ImuTruth",
     "Motion",
+    "allan_deviation",
     "c_header",
     "constant_rate",
     "kalibr_yaml",
