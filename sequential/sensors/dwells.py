@@ -1,0 +1,102 @@
+"""Dwells of a recording as numbers: mean readings while it is still, and how well each mean is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import DataError
+from sequential.sensors.recording import ImuRecording
+from sequential.sensors.still import StillDetector
+
+__all__ = ["Dwells", "find_dwells"]
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+BLOCK = 0.25  # s: means of such blocks are taken for independent of one another
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dwells:
+    """Still parts of one recording, in order.
+
+    Parameters
+    ----------
+    start, stop : (K,) first and last row of each
+    rows : (K,) samples in it, knocks left out
+    accel : (K, 3) mean reading in the recording's unit, None without an accelerometer
+    accel_cov : (K, 3, 3) covariance of that mean, correlation between samples counted in
+    gyro, gyro_cov : the same of the gyro
+    seconds : (K, 2) first and last instant, s after the recording's first sample
+    accel_unit, gyro_unit : units of the means
+    name : of the recording
+    """
+
+    start: Stamps
+    stop: Stamps
+    rows: Stamps
+    seconds: Array
+    accel: Array | None = None
+    accel_cov: Array | None = None
+    gyro: Array | None = None
+    gyro_cov: Array | None = None
+    accel_unit: str = "m/s^2"
+    gyro_unit: str = "rad/s"
+    name: str = "recording"
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def find_dwells(recording: ImuRecording, detector: StillDetector | None = None) -> Dwells:
+    """Find the still parts of a recording and average them.
+
+    Raises
+    ------
+    DataError
+        where the recording is never still for long enough.
+    """
+    detector = detector or StillDetector()
+    found = detector.find(recording)
+    if not found:
+        raise DataError(
+            f"recording {recording.name!r} is nowhere still for {detector.shortest:g} s: hold every position "
+            "for 3 s on a firm support, or allow shorter dwells"
+        )
+    length = max(2, round(BLOCK * recording.rate))
+    times = recording.seconds
+    means: dict[str, Array] = {}
+    for sensor in ("accel", "gyro"):
+        values = getattr(recording, sensor)
+        if values is not None:
+            means[sensor], means[f"{sensor}_cov"] = _averages([values[rows] for rows in found], length)
+    return Dwells(
+        start=np.array([rows[0] for rows in found]),
+        stop=np.array([rows[-1] for rows in found]),
+        rows=np.array([len(rows) for rows in found]),
+        seconds=np.array([(times[rows[0]], times[rows[-1]]) for rows in found]),
+        accel_unit=recording.accel_unit,
+        gyro_unit=recording.gyro_unit,
+        name=recording.name,
+        **means,
+    )
+
+
+def _averages(parts: list[Array], length: int) -> tuple[Array, Array]:
+    """Means (K, 3) and their covariances (K, 3, 3).
+
+    Samples of one sensor are correlated by its filter and by drift, by the same factor in every dwell: the
+    variance of block means over what independent samples would give, as the median over the dwells.
+    """
+    white, ratio = [], []
+    for part in parts:
+        cov = np.cov(part.T) / len(part)
+        white.append(cov)
+        count = len(part) // length
+        if count >= 4 and (trace := np.trace(cov)) > 0:
+            blocks = part[: count * length].reshape(count, length, 3).mean(axis=1)
+            ratio.append(np.trace(np.cov(blocks.T)) / count / trace)
+    factor = max(1.0, float(np.median(ratio))) if ratio else 1.0
+    return np.array([part.mean(axis=0) for part in parts]), factor * np.array(white)

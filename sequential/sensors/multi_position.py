@@ -1,0 +1,233 @@
+"""Accelerometer calibration from dwells in many positions: gain, offset and misalignment, or six positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import DataError, UnderConstrainedError
+from sequential.sensors.calibration import AffineCalibration
+from sequential.sensors.dwells import Dwells
+from sequential.sensors.finding import Finding
+from sequential.sensors.gravity import STANDARD_GRAVITY
+from sequential.sensors.gravity_fit import (
+    NAMES,
+    GravityFit,
+    Prior,
+    fit_norm,
+    matrix_of,
+    norm_jacobian,
+    norms,
+    robust_inliers,
+)
+from sequential.sensors.positions import missing_positions
+
+__all__ = ["AccelerometerFit", "MultiPosition"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+FREE, DOUBTFUL = 0.5, 0.7  # posterior over prior standard deviation: not observed
+DOUBT = 1e-3  # probability that a good recording loses a dwell
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AccelerometerFit:
+    """A calibrated accelerometer, and what every dwell says about it.
+
+    `before`, `after` and `left_out` (K,) are |mean| - g in m/s²: with nominal constants, with the fitted
+    ones, and with constants fitted to the *other* dwells.  `used` (K,) is False for a dwell that disagrees
+    with all others; such a dwell has no part in any fit.
+    """
+
+    calibration: AffineCalibration
+    fit: GravityFit
+    dwells: Dwells
+    gravity: float
+    used: Mask
+    before: Array
+    after: Array
+    left_out: Array
+    sigmas: Array  # (K,) expected spread of left_out
+    findings: tuple[Finding, ...]
+
+    @property
+    def leave_one_out_rms(self) -> float:
+        """Root mean square of `left_out` over the dwells that were used, m/s²."""
+        return float(np.sqrt(np.mean(self.left_out[self.used] ** 2)))
+
+
+@dataclass(frozen=True, slots=True)
+class MultiPosition:
+    """Settings of the fit.
+
+    Parameters
+    ----------
+    gravity : |g| where the recording was made, m/s²
+    shears : False for gain and offset per axis alone, as from six positions
+    six : also require all six positions, an axis up and down each
+    prior : what is known of any accelerometer
+    """
+
+    gravity: float = STANDARD_GRAVITY
+    shears: bool = True
+    six: bool = False
+    prior: Prior = field(default_factory=Prior)
+
+    def calibrate(self, dwells: Dwells, source: str = "") -> AccelerometerFit:
+        """Fit the dwells' means.
+
+        Raises
+        ------
+        DataError, UnderConstrainedError
+            where there are too few dwells, or where their directions leave a gain or an offset free.
+        """
+        if dwells.accel is None or dwells.accel_cov is None:
+            raise DataError(f"recording {dwells.name!r} has no accelerometer")
+        self._require_enough(dwells)
+        means, covs = dwells.accel, dwells.accel_cov
+        start = nominal(means, self.gravity, si=dwells.accel_unit == "m/s^2")
+        used = robust_inliers(means, covs, self.gravity, start, self.prior, shears=self.shears)
+        used, left_out, sigmas = self._cross_validated(dwells, used)
+        fit = self._fit(dwells, used)
+        self._require_observed(dwells, fit)
+        return AccelerometerFit(
+            self._calibration(fit, dwells, used, source),
+            fit,
+            dwells,
+            self.gravity,
+            used,
+            norms(start, means) - self.gravity,
+            norms(fit.parameters, means) - self.gravity,
+            left_out,
+            sigmas,
+            self._findings(dwells, fit, used, left_out),
+        )
+
+    def _fit(self, dwells: Dwells, used: Mask) -> GravityFit:
+        assert dwells.accel is not None  # noqa: S101 - calibrate() has looked
+        assert dwells.accel_cov is not None  # noqa: S101
+        means = dwells.accel[used]
+        start = nominal(means, self.gravity, si=dwells.accel_unit == "m/s^2")
+        return fit_norm(means, dwells.accel_cov[used], self.gravity, start, self.prior, shears=self.shears)
+
+    def _cross_validated(self, dwells: Dwells, used: Mask) -> tuple[Mask, Array, Array]:
+        """Predict every dwell from the others; those that are impossible leave, wrongly doubted ones return."""
+        from scipy.special import stdtrit
+
+        assert dwells.accel is not None  # noqa: S101 - calibrate() has looked
+        assert dwells.accel_cov is not None  # noqa: S101
+        count = len(dwells)
+        for _ in range(count):
+            left_out, sigmas, limit = np.empty(count), np.empty(count), np.empty(count)
+            for k in range(count):
+                fit = self._fit(dwells, used & (np.arange(count) != k))
+                mean = dwells.accel[k : k + 1]
+                slope = norm_jacobian(fit.parameters, mean)[0]
+                noise = slope[6:] @ dwells.accel_cov[k] @ slope[6:] + fit.scatter**2
+                left_out[k] = norms(fit.parameters, mean)[0] - self.gravity
+                sigmas[k] = np.sqrt(noise + slope @ fit.cov @ slope)
+                limit[k] = -stdtrit(fit.freedom + self.prior.scatter_weight, DOUBT / 2 / count)
+            score = np.abs(left_out) / sigmas / limit
+            worst = int(np.argmax(np.where(used, score, 0.0)))
+            best = int(np.argmin(np.where(used, np.inf, score)))
+            if not used[best] and score[best] < 1.0:
+                used = used | (np.arange(count) == best)
+            elif score[worst] > 1.0 and used.sum() > self._fewest:
+                used = used & (np.arange(count) != worst)
+            else:
+                break
+        return used, left_out, sigmas
+
+    @property
+    def _fewest(self) -> int:
+        return 6
+
+    def _require_enough(self, dwells: Dwells) -> None:
+        if self.six and (missing := missing_positions(dwells)):
+            raise UnderConstrainedError(
+                f"six positions need every axis up and down; {len(dwells)} dwells of {dwells.name!r} leave out "
+                f"{', '.join(missing)}: gain and offset of that axis cannot be told apart; record it as well"
+            )
+        if len(dwells) < self._fewest:
+            raise UnderConstrainedError(
+                f"{dwells.name!r} holds {len(dwells)} dwells, at least {self._fewest} positions are needed for "
+                "gain and offset and nine for the misalignment: hold more positions, 3 s each"
+            )
+
+    def _require_observed(self, dwells: Dwells, fit: GravityFit) -> None:
+        """Gains and offsets must come from the data; a combination of them may be what is free."""
+        sigmas = np.sqrt(np.diag(fit.cov)) / np.maximum(fit.kept, 1e-300)
+        chosen = np.r_[0:3, 6:9]
+        known = (fit.cov / np.outer(sigmas, sigmas))[np.ix_(chosen, chosen)]
+        values, vectors = np.linalg.eigh(known)
+        if values[-1] <= FREE**2:
+            return
+        blamed = [NAMES[chosen[k]] for k in np.flatnonzero(np.abs(vectors[:, -1]) > 0.35)]
+        raise UnderConstrainedError(
+            f"the positions of {dwells.name!r} leave {', '.join(blamed)} undetermined: the directions of gravity "
+            f"lie in one plane or on one side; add positions with {_axes(blamed)} pointing up and down"
+        )
+
+    def _calibration(self, fit: GravityFit, dwells: Dwells, used: Mask, source: str) -> AffineCalibration:
+        J = matrix_jacobian(fit.parameters)
+        return AffineCalibration(
+            matrix_of(fit.parameters),
+            fit.parameters[6:],
+            J @ fit.cov @ J.T,
+            "accel",
+            dwells.accel_unit,
+            "m/s^2",
+            float(np.sqrt(np.mean(fit.residual**2))),
+            source or f"{dwells.name}: {int(used.sum())} dwells, g = {self.gravity:.5f} m/s^2",
+        )
+
+    def _findings(
+        self, dwells: Dwells, fit: GravityFit, used: Mask, left_out: Array
+    ) -> tuple[Finding, ...]:
+        found = []
+        for k in np.flatnonzero(~used):
+            start, stop = dwells.seconds[k]
+            what = f"dwell {k + 1} disagrees with all others by {left_out[k]:+.3f} m/s² and was left out"
+            found.append(Finding("warn", what, f"{start:.1f}-{stop:.1f} s", "was the sensor moving, or knocked?"))
+        if self.shears:
+            vague = [NAMES[k] for k in range(3, 6) if fit.kept[k] > DOUBTFUL]
+            if vague:
+                planes = " and ".join(f"{name[-1]} and {name[-2]}" for name in vague)
+                what = f"{', '.join(vague)} cannot be seen from these positions and stays near zero"
+                found.append(Finding("warn", what, "", f"add positions half way between the axes {planes}"))
+        if fit.freedom < 3:
+            what = f"{int(used.sum())} dwells for {9 if self.shears else 6} unknowns: hardly anything is left to check"
+            found.append(Finding("warn", what, "", "record 15 positions or more"))
+        return tuple(found)
+
+
+def nominal(means: Array, gravity: float, *, si: bool) -> Array:
+    """Constants of a sensor that is in order: its data sheet's, or one gain and the middle of its readings."""
+    if si:
+        return np.r_[np.ones(3), np.zeros(6)]
+    middle = (means.min(axis=0) + means.max(axis=0)) / 2
+    gain = gravity / float(np.median(np.linalg.norm(means - middle, axis=1)))
+    return np.r_[np.full(3, gain), np.zeros(3), middle]
+
+
+def matrix_jacobian(parameters: Array) -> Array:
+    """Derivative (12, 9) of the matrix, row by row, and the offset."""
+    J = np.zeros((12, 9))
+    matrix = matrix_of(parameters)
+    for column in range(3):
+        J[column:9:3, column] = matrix[:, column] / parameters[column]
+    for k, (a, b) in enumerate(((1, 0), (2, 0), (2, 1))):
+        J[3 * a + b, 3 + k] = parameters[b]
+    J[9:, 6:] = np.eye(3)
+    return J
+
+
+def _axes(names: list[str]) -> str:
+    return " and ".join(sorted({name[-1] for name in names}))
+
+
+def with_gravity(settings: MultiPosition, gravity: float) -> MultiPosition:
+    """The same settings at another place."""
+    return replace(settings, gravity=gravity)
