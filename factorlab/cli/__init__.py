@@ -5,6 +5,7 @@ Exit codes: 0 ok, 1 the data are at fault, 2 the command line is, 3 (only with -
 
 import click
 
+from factorlab.cli.calibrate import calibrate
 from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
@@ -39,5 +40,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, info, doctor):
+for command in (demo, compare, tune, calibrate, info, doctor):
     main.add_command(command)

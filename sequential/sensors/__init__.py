@@ -11,15 +11,22 @@
 from sequential.sensors.allan import AllanDeviation, allan_deviation
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import c_header, kalibr_yaml
+from sequential.sensors.dwells import Dwells, find_dwells
 from sequential.sensors.finding import Finding
+from sequential.sensors.gravity import STANDARD_GRAVITY, local_gravity
 from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, stationary, tumble, waypoints
+from sequential.sensors.multi_position import AccelerometerFit, MultiPosition
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simulate_imu
+from sequential.sensors.still import StillDetector
 
 __all__ = [
     "SIX_POSITIONS",
+    "STANDARD_GRAVITY",
+    "AccelerometerFit",
     "AffineCalibration",
     "AllanDeviation",
+    "Dwells",
     "Finding",
     "ImuCalibration",
     "ImuErrors",
@@ -27,10 +34,14 @@ __all__ = [
     "ImuSimulation",
     "ImuTruth",
     "Motion",
+    "MultiPosition",
+    "StillDetector",
     "allan_deviation",
     "c_header",
     "constant_rate",
+    "find_dwells",
     "kalibr_yaml",
+    "local_gravity",
     "simulate_imu",
     "stationary",
     "tumble",

@@ -10,6 +10,7 @@ its y axis into the plane of the accelerometer's x and y, as Kalibr does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,16 @@ from numpy.typing import NDArray
 
 from sequential.errors import NotConvergedError
 
-__all__ = ["NAMES", "GravityFit", "Prior", "fit_norm", "matrix_of", "norm_jacobian"]
+__all__ = [
+    "NAMES",
+    "GravityFit",
+    "Prior",
+    "fit_norm",
+    "matrix_of",
+    "norm_jacobian",
+    "norms",
+    "robust_inliers",
+]
 
 Array = NDArray[np.float64]
 NAMES = ("gain x", "gain y", "gain z", "shear yx", "shear zx", "shear zy", "offset x", "offset y", "offset z")
@@ -99,8 +109,7 @@ def fit_norm(
     start : (9,) centre of the prior and first guess
     shears : False leaves the shears at zero: gain and offset per axis
     """
-    gain = float(np.mean(start[:3]))
-    sigmas = np.repeat([prior.gain * gain, prior.shear if shears else 1e-12, prior.offset * gravity / gain], 3)
+    sigmas = _sigmas(start, gravity, prior, shears=shears)
     scatter, parameters = 1e-2 * gravity, start.copy()
     for _ in range(20):
         variance = _variance(parameters, means, covs) + scatter**2
@@ -114,7 +123,7 @@ def fit_norm(
             scatter = again
             break
         scatter = again
-    variance = own + scatter**2
+    variance = _variance(parameters, means, covs) + scatter**2
     parameters = _maximise(parameters, means, gravity, variance, start, sigmas)
     J = norm_jacobian(parameters, means) * sigmas
     cov = np.linalg.inv(J.T @ (J / variance[:, None]) + np.eye(9))
@@ -127,6 +136,28 @@ def fit_norm(
         freedom,
         np.sqrt(np.diag(cov)),
     )
+
+
+def robust_inliers(
+    means: Array, covs: Array, gravity: float, start: Array, prior: Prior, *, shears: bool = True
+) -> NDArray[np.bool_]:
+    """Dwells (K,) that are not far off a fit which bad ones cannot pull: Cauchy's loss, reweighted."""
+    sigmas = _sigmas(start, gravity, prior, shears=shears)
+    parameters, variance = start.copy(), np.full(len(means), (0.05 * gravity) ** 2)
+    scale = np.sqrt(variance)
+    for _ in range(30):
+        parameters = _maximise(parameters, means, gravity, variance, start, sigmas)
+        off = np.abs(norms(parameters, means) - gravity)
+        floor = _variance(parameters, means, covs) + (5 * prior.scatter * gravity) ** 2
+        scale = np.sqrt((1.4826 * np.median(off)) ** 2 + floor)
+        variance = scale**2 * (1 + (off / (2.385 * scale)) ** 2)
+    return np.asarray(np.abs(norms(parameters, means) - gravity) <= 8 * scale)
+
+
+def _sigmas(start: Array, gravity: float, prior: Prior, *, shears: bool) -> Array:
+    """Standard deviations (9,) of the prior in the units of the parameters."""
+    gain = float(np.mean(start[:3]))
+    return np.repeat([prior.gain * gain, prior.shear if shears else 1e-12, prior.offset * gravity / gain], 3)
 
 
 def _variance(parameters: Array, means: Array, covs: Array) -> Array:
@@ -142,7 +173,7 @@ def _maximise(
     weight = 1 / np.sqrt(variance)
 
     def residuals(x: Array) -> Array:
-        return np.r_[(norms(centre + sigmas * x, means) - gravity) * weight, x]
+        return np.concatenate([(norms(centre + sigmas * x, means) - gravity) * weight, x])
 
     x, damping = (parameters - centre) / sigmas, 1e-6
     r = residuals(x)
@@ -181,7 +212,7 @@ def _scatter(innovation: Array, J: Array, own: Array, gravity: float, prior: Pri
     return float(np.exp(_golden(cost, low, high)))
 
 
-def _golden(cost, low: float, high: float) -> float:
+def _golden(cost: Callable[[float], float], low: float, high: float) -> float:
     """Minimum of a function of one variable between two bounds, to a hundredth."""
     ratio = (5**0.5 - 1) / 2
     while high - low > 0.01:

@@ -1,8 +1,8 @@
-"""Accelerometer calibration from dwells in many positions: gain, offset and misalignment, or six positions."""
+"""Accelerometer calibration from many positions (gain, offset, misalignment) or from six (gain, offset)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,14 +113,14 @@ class MultiPosition:
         return fit_norm(means, dwells.accel_cov[used], self.gravity, start, self.prior, shears=self.shears)
 
     def _cross_validated(self, dwells: Dwells, used: Mask) -> tuple[Mask, Array, Array]:
-        """Predict every dwell from the others; those that are impossible leave, wrongly doubted ones return."""
+        """Predict every dwell from the others: impossible ones leave, wrongly doubted ones return."""
         from scipy.special import stdtrit
 
         assert dwells.accel is not None  # noqa: S101 - calibrate() has looked
         assert dwells.accel_cov is not None  # noqa: S101
         count = len(dwells)
+        left_out, sigmas, limit = np.empty(count), np.empty(count), np.empty(count)
         for _ in range(count):
-            left_out, sigmas, limit = np.empty(count), np.empty(count), np.empty(count)
             for k in range(count):
                 fit = self._fit(dwells, used & (np.arange(count) != k))
                 mean = dwells.accel[k : k + 1]
@@ -147,13 +147,13 @@ class MultiPosition:
     def _require_enough(self, dwells: Dwells) -> None:
         if self.six and (missing := missing_positions(dwells)):
             raise UnderConstrainedError(
-                f"six positions need every axis up and down; {len(dwells)} dwells of {dwells.name!r} leave out "
-                f"{', '.join(missing)}: gain and offset of that axis cannot be told apart; record it as well"
+                f"six positions need every axis up and down; {dwells.name!r} has no position with "
+                f"{' nor '.join(missing)}; gain and offset of that axis cannot be told apart, record it as well"
             )
         if len(dwells) < self._fewest:
             raise UnderConstrainedError(
-                f"{dwells.name!r} holds {len(dwells)} dwells, at least {self._fewest} positions are needed for "
-                "gain and offset and nine for the misalignment: hold more positions, 3 s each"
+                f"{dwells.name!r} holds {len(dwells)} dwells; gain and offset need {self._fewest} positions "
+                "at least and the misalignment nine: hold more positions, 3 s each"
             )
 
     def _require_observed(self, dwells: Dwells, fit: GravityFit) -> None:
@@ -166,7 +166,7 @@ class MultiPosition:
             return
         blamed = [NAMES[chosen[k]] for k in np.flatnonzero(np.abs(vectors[:, -1]) > 0.35)]
         raise UnderConstrainedError(
-            f"the positions of {dwells.name!r} leave {', '.join(blamed)} undetermined: the directions of gravity "
+            f"the positions of {dwells.name!r} leave {', '.join(blamed)} undetermined: gravity's directions "
             f"lie in one plane or on one side; add positions with {_axes(blamed)} pointing up and down"
         )
 
@@ -183,14 +183,12 @@ class MultiPosition:
             source or f"{dwells.name}: {int(used.sum())} dwells, g = {self.gravity:.5f} m/s^2",
         )
 
-    def _findings(
-        self, dwells: Dwells, fit: GravityFit, used: Mask, left_out: Array
-    ) -> tuple[Finding, ...]:
+    def _findings(self, dwells: Dwells, fit: GravityFit, used: Mask, left_out: Array) -> tuple[Finding, ...]:
         found = []
         for k in np.flatnonzero(~used):
             start, stop = dwells.seconds[k]
             what = f"dwell {k + 1} disagrees with all others by {left_out[k]:+.3f} m/s² and was left out"
-            found.append(Finding("warn", what, f"{start:.1f}-{stop:.1f} s", "was the sensor moving, or knocked?"))
+            found.append(Finding("warn", what, f"{start:.1f}-{stop:.1f} s", "repeat it if it matters"))
         if self.shears:
             vague = [NAMES[k] for k in range(3, 6) if fit.kept[k] > DOUBTFUL]
             if vague:
@@ -198,18 +196,19 @@ class MultiPosition:
                 what = f"{', '.join(vague)} cannot be seen from these positions and stays near zero"
                 found.append(Finding("warn", what, "", f"add positions half way between the axes {planes}"))
         if fit.freedom < 3:
-            what = f"{int(used.sum())} dwells for {9 if self.shears else 6} unknowns: hardly anything is left to check"
+            unknowns = 9 if self.shears else 6
+            what = f"{int(used.sum())} dwells for {unknowns} unknowns: hardly anything is left to check"
             found.append(Finding("warn", what, "", "record 15 positions or more"))
         return tuple(found)
 
 
 def nominal(means: Array, gravity: float, *, si: bool) -> Array:
-    """Constants of a sensor that is in order: its data sheet's, or one gain and the middle of its readings."""
+    """Constants of a sensor in order: its data sheet's, or one gain and the middle of its readings."""
     if si:
-        return np.r_[np.ones(3), np.zeros(6)]
+        return np.concatenate([np.ones(3), np.zeros(6)])
     middle = (means.min(axis=0) + means.max(axis=0)) / 2
     gain = gravity / float(np.median(np.linalg.norm(means - middle, axis=1)))
-    return np.r_[np.full(3, gain), np.zeros(3), middle]
+    return np.concatenate([np.full(3, gain), np.zeros(3), middle])
 
 
 def matrix_jacobian(parameters: Array) -> Array:
@@ -226,8 +225,3 @@ def matrix_jacobian(parameters: Array) -> Array:
 
 def _axes(names: list[str]) -> str:
     return " and ".join(sorted({name[-1] for name in names}))
-
-
-def with_gravity(settings: MultiPosition, gravity: float) -> MultiPosition:
-    """The same settings at another place."""
-    return replace(settings, gravity=gravity)

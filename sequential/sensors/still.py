@@ -149,7 +149,9 @@ def _parting(ratio: Array, bins: int = 128) -> float:
 def _bridged(still: Mask, gap: int, recording: ImuRecording) -> list[tuple[int, int]]:
     """Runs of still samples [start, stop), joined over gaps that end where they began."""
     step = np.diff(still.astype(np.int8), prepend=0, append=0)
-    runs = [(int(a), int(b)) for a, b in zip(np.flatnonzero(step == 1), np.flatnonzero(step == -1), strict=True)]
+    runs = [
+        (int(a), int(b)) for a, b in zip(np.flatnonzero(step == 1), np.flatnonzero(step == -1), strict=True)
+    ]
     values = recording.accel if recording.accel is not None else recording.gyro
     assert values is not None  # noqa: S101 - levels() has looked
     joined: list[tuple[int, int]] = []
