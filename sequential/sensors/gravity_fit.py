@@ -23,6 +23,7 @@ __all__ = [
     "GravityFit",
     "Prior",
     "fit_norm",
+    "foreseen",
     "matrix_of",
     "norm_jacobian",
     "norms",
@@ -154,6 +155,13 @@ def robust_inliers(
     return np.asarray(np.abs(norms(parameters, means) - gravity) <= 8 * scale)
 
 
+def foreseen(means: Array, gravity: float, start: Array, prior: Prior, *, shears: bool = True) -> Array:
+    """Covariance (9, 9) of the parameters over the prior's, from the directions alone, before any fit."""
+    sigmas = _sigmas(start, gravity, prior, shears=shears)
+    J = norm_jacobian(start, means) * sigmas / (1e-3 * gravity)
+    return np.asarray(np.linalg.inv(J.T @ J + np.eye(9)))
+
+
 def _sigmas(start: Array, gravity: float, prior: Prior, *, shears: bool) -> Array:
     """Standard deviations (9,) of the prior in the units of the parameters."""
     gain = float(np.mean(start[:3]))
@@ -183,8 +191,10 @@ def _maximise(
         step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), gradient)
         tried = residuals(x + step)
         if tried @ tried <= r @ r:
+            gained = r @ r - tried @ tried
             x, r, damping = x + step, tried, max(damping / 10, 1e-12)
-            if np.abs(step).max() <= 1e-10 * (1 + np.abs(x).max()):
+            # a step too small for a digit, or a valley along which nothing is to be gained
+            if np.abs(step).max() <= 1e-10 * (1 + np.abs(x).max()) or gained <= 1e-14 * (1 + r @ r):
                 return np.asarray(centre + sigmas * x)
         else:
             damping *= 10

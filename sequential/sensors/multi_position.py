@@ -17,6 +17,7 @@ from sequential.sensors.gravity_fit import (
     GravityFit,
     Prior,
     fit_norm,
+    foreseen,
     matrix_of,
     norm_jacobian,
     norms,
@@ -88,10 +89,12 @@ class MultiPosition:
         self._require_enough(dwells)
         means, covs = dwells.accel, dwells.accel_cov
         start = nominal(means, self.gravity, si=dwells.accel_unit == "m/s^2")
+        self._require_observed(dwells, foreseen(means, self.gravity, start, self.prior, shears=self.shears))
         used = robust_inliers(means, covs, self.gravity, start, self.prior, shears=self.shears)
         used, left_out, sigmas = self._cross_validated(dwells, used)
         fit = self._fit(dwells, used)
-        self._require_observed(dwells, fit)
+        sigmas_prior = np.sqrt(np.diag(fit.cov)) / fit.kept
+        self._require_observed(dwells, fit.cov / np.outer(sigmas_prior, sigmas_prior))
         return AccelerometerFit(
             self._calibration(fit, dwells, used, source),
             fit,
@@ -148,7 +151,7 @@ class MultiPosition:
         if self.six and (missing := missing_positions(dwells)):
             raise UnderConstrainedError(
                 f"six positions need every axis up and down; {dwells.name!r} has no position with "
-                f"{' nor '.join(missing)}; gain and offset of that axis cannot be told apart, record it as well"
+                f"{' nor '.join(missing)}; its gain and offset cannot be told apart, record it as well"
             )
         if len(dwells) < self._fewest:
             raise UnderConstrainedError(
@@ -156,12 +159,13 @@ class MultiPosition:
                 "at least and the misalignment nine: hold more positions, 3 s each"
             )
 
-    def _require_observed(self, dwells: Dwells, fit: GravityFit) -> None:
-        """Gains and offsets must come from the data; a combination of them may be what is free."""
-        sigmas = np.sqrt(np.diag(fit.cov)) / np.maximum(fit.kept, 1e-300)
+    def _require_observed(self, dwells: Dwells, cov: Array) -> None:
+        """Gains and offsets must come from the data; a combination of them may be what is free.
+
+        `cov` (9, 9) is over the prior's standard deviations.
+        """
         chosen = np.r_[0:3, 6:9]
-        known = (fit.cov / np.outer(sigmas, sigmas))[np.ix_(chosen, chosen)]
-        values, vectors = np.linalg.eigh(known)
+        values, vectors = np.linalg.eigh(cov[np.ix_(chosen, chosen)])
         if values[-1] <= FREE**2:
             return
         blamed = [NAMES[chosen[k]] for k in np.flatnonzero(np.abs(vectors[:, -1]) > 0.35)]
