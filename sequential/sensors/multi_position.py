@@ -168,7 +168,10 @@ class MultiPosition:
         values, vectors = np.linalg.eigh(cov[np.ix_(chosen, chosen)])
         if values[-1] <= FREE**2:
             return
-        blamed = [NAMES[chosen[k]] for k in np.flatnonzero(np.abs(vectors[:, -1]) > 0.35)]
+        blamed = [
+            NAMES[chosen[k]]
+            for k in np.flatnonzero((np.abs(vectors[:, values > FREE**2]) > 0.35).any(axis=1))
+        ]
         raise UnderConstrainedError(
             f"the positions of {dwells.name!r} leave {', '.join(blamed)} undetermined: gravity's directions "
             f"lie in one plane or on one side; add positions with {_axes(blamed)} pointing up and down"

@@ -107,7 +107,7 @@ def test_a_missing_position_is_named(rng, missing, said):
 def test_coplanar_positions_are_refused_with_advice(rng):
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     flat = np.c_[np.cos(angle), np.sin(angle), 0 * angle]
-    with pytest.raises(UnderConstrainedError, match=r"offset z.*z pointing up and down"):
+    with pytest.raises(UnderConstrainedError, match=r"leave gain z.*with z pointing up and down"):
         MultiPosition().calibrate(drawn(flat, rng))
     tilted = flat @ np.linalg.qr(rng.standard_normal((3, 3)))[0]
     with pytest.raises(UnderConstrainedError, match="in one plane"):
