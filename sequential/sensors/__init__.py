@@ -11,7 +11,10 @@
 from sequential.sensors.allan import AllanDeviation, allan_deviation
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import c_header, kalibr_yaml
+from sequential.sensors.characterize import Characteristics, characterize
+from sequential.sensors.characterize_step import StepResponse, step_response
 from sequential.sensors.dwells import Dwells, find_dwells
+from sequential.sensors.estimate import Estimate
 from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY, local_gravity
 from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, stationary, tumble, waypoints
@@ -26,7 +29,9 @@ __all__ = [
     "AccelerometerFit",
     "AffineCalibration",
     "AllanDeviation",
+    "Characteristics",
     "Dwells",
+    "Estimate",
     "Finding",
     "ImuCalibration",
     "ImuErrors",
@@ -35,15 +40,18 @@ __all__ = [
     "ImuTruth",
     "Motion",
     "MultiPosition",
+    "StepResponse",
     "StillDetector",
     "allan_deviation",
     "c_header",
+    "characterize",
     "constant_rate",
     "find_dwells",
     "kalibr_yaml",
     "local_gravity",
     "simulate_imu",
     "stationary",
+    "step_response",
     "tumble",
     "waypoints",
 ]

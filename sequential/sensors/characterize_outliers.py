@@ -1,0 +1,79 @@
+"""Readings that do not belong to the noise: how often, how far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.sensors.estimate import Estimate
+from sequential.signal import Hampel
+
+__all__ = ["Outliers", "outliers_of"]
+
+Array = NDArray[np.float64]
+WINDOW = 51
+THRESHOLD = 6.0  # σ of the window, which is uncertain by a tenth; one normal reading in 1e7 is flagged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outliers:
+    """Readings far from the median of their neighbours.
+
+    Parameters
+    ----------
+    where : (N,) True for an outlier
+    share : of the readings, with an exact binomial interval
+    per_hour : how many come in an hour
+    typical, largest : median and maximum of their distance from the local median; NaN where there are none
+    typical_sigmas : the same median in local standard deviations
+    """
+
+    where: NDArray[np.bool_]
+    share: Estimate
+    per_hour: float
+    typical: float
+    largest: float
+    typical_sigmas: float
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(self.where.sum())
+
+
+def outliers_of(t: Array, x: Array, lsb: float = 0.0) -> Outliers:
+    """Find outliers of readings (N,) at t (N,) s by Hampel's identifier: six σ from the median of 51.
+
+    Parameters
+    ----------
+    lsb : resolution, below which no local σ is taken to lie
+
+    Notes
+    -----
+    Median and MAD of a window bear half of it being outliers, and a step of the signal is none.
+    """
+    window = min(WINDOW, max(3, (len(x) // 2) | 1))
+    seen = Hampel(window, threshold=THRESHOLD, floor=lsb).spread(x)
+    where = seen.outlier
+    n, k = int(np.isfinite(x).sum()), int(where.sum())
+    far = np.abs(x - seen.median)[where]
+    hours = float(t[-1] - t[0]) / 3600.0 if len(t) > 1 else 0.0
+    return Outliers(
+        where,
+        Estimate(k / max(n, 1), *_clopper_pearson(k, max(n, 1))),
+        k / hours if hours > 0.0 else 0.0,
+        float(np.median(far)) if k else float("nan"),
+        float(far.max()) if k else float("nan"),
+        float(np.median(far / np.maximum(seen.sigma[where], 1e-300))) if k else float("nan"),
+    )
+
+
+def _clopper_pearson(k: int, n: int) -> tuple[float, float]:
+    """95 % interval of a share, exact (Clopper and Pearson 1934)."""
+    from scipy.special import betaincinv
+
+    low = float(betaincinv(k, n - k + 1, 0.025)) if k else 0.0
+    high = float(betaincinv(k + 1, n - k, 0.975)) if k < n else 1.0
+    return low, high
