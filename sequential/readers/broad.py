@@ -16,6 +16,7 @@ from sequential.log import frozen
 from sequential.readers.files import require_file
 from sequential.readers.npz import read_arrays
 from sequential.sensors.finding import Finding
+from sequential.sensors.gravity import STANDARD_GRAVITY
 from sequential.sensors.recording import ImuRecording
 
 __all__ = ["BroadTruth", "is_broad", "read_broad"]
@@ -23,7 +24,6 @@ __all__ = ["BroadTruth", "is_broad", "read_broad"]
 Array = NDArray[np.float64]
 PACKED = ("gyr", "acc", "mag", "quat", "movement", "rate")
 ORIGINAL = ("imu_gyr", "imu_acc", "imu_mag", "opt_quat", "movement", "sampling_rate")
-GRAVITY = 9.80665  # m/s² in one g
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +121,7 @@ def _metric(accel: Array) -> tuple[Array, tuple[Finding, ...]]:
     usual = float(np.median(np.linalg.norm(accel, axis=1)))
     if usual > 3.0:
         return accel, ()
-    return accel * GRAVITY, (Finding("note", f"accelerations are in g (median length {usual:.3f})"),)
+    return accel * STANDARD_GRAVITY, (Finding("note", f"accelerations are in g (median length {usual:.3f})"),)
 
 
 def _truth(quaternion: Array, movement: NDArray[np.bool_]) -> BroadTruth:

@@ -13,13 +13,13 @@ from sequential.errors import DataError, ShapeError
 from sequential.log import nanoseconds, seconds
 from sequential.manifold.quaternion import quaternion_inverse, rotate
 from sequential.noise import ImuNoise
+from sequential.sensors.gravity import STANDARD_GRAVITY
 from sequential.sensors.motion import Motion
 from sequential.sensors.recording import ImuRecording
 
 __all__ = ["ImuErrors", "ImuSimulation", "ImuTruth", "simulate_imu"]
 
 Array = NDArray[np.float64]
-GRAVITY = 9.80665  # m/s²
 FIELD = (0.0, 22.0, -42.0)  # µT, east north up: middle latitudes of the north
 ZERO = (0.0, 0.0, 0.0)
 QUIET = ImuNoise(0.0, 0.0, 0.0, 0.0)
@@ -84,7 +84,7 @@ def simulate_imu(
     *,
     rate: float = 100.0,
     errors: ImuErrors | None = None,
-    gravity: float = GRAVITY,
+    gravity: float = STANDARD_GRAVITY,
     field: ArrayLike | None = FIELD,
     disturbance: Callable[[Array], Array] | None = None,
     mag_every: int = 1,

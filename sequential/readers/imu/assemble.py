@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from sequential.errors import FileFormatError, MissingStreamError
 from sequential.readers.imu.clock import NO_STAMP, ordered
-from sequential.readers.imu.guess import FREE_FALL, guess_accel, guess_gyro, guess_mag, level_at_rest
+from sequential.readers.imu.guess import FREE_FALL, guess_accel, guess_gyro, guess_mag
 from sequential.readers.imu.units import GRAVITY, Scale
 from sequential.sensors.finding import Finding, Severity
 from sequential.sensors.recording import ImuRecording
+from sequential.sensors.turning import level_at_rest
 
 __all__ = ["Channels", "assemble"]
 

@@ -12,11 +12,12 @@ from sequential.errors import FileFormatError, MissingStreamError
 from sequential.readers.imu.archive import Export
 from sequential.readers.imu.assemble import Channels
 from sequential.readers.imu.clock import stamps_of
-from sequential.readers.imu.guess import FREE_FALL, level_at_rest
+from sequential.readers.imu.guess import FREE_FALL
 from sequential.readers.imu.merge import SensorStream, merge
 from sequential.readers.imu.text_table import TextTable, table_of
 from sequential.readers.imu.units import GRAVITY, Scale, scale_of
 from sequential.sensors.finding import Finding
+from sequential.sensors.turning import level_at_rest
 
 __all__ = ["is_phone_header", "phone_channels", "sensor_logger_json"]
 

@@ -9,10 +9,11 @@ from difflib import get_close_matches
 from math import pi
 
 from sequential.errors import DataError
+from sequential.sensors.gravity import STANDARD_GRAVITY
 
 __all__ = ["FACTORS", "GRAVITY", "Scale", "known_units", "parse_units", "scale_of"]
 
-GRAVITY = 9.80665  # m/s² in one g
+GRAVITY = STANDARD_GRAVITY  # m/s² in one g
 DEG = pi / 180.0
 
 FACTORS: dict[str, dict[str, float]] = {
