@@ -126,29 +126,34 @@ def _separate(channels: Channels) -> None:
     again = np.concatenate([[False], np.diff(t) == 0])
     if not again.any():
         return
-    same = again.copy()
+    where = f"first at sample {int(np.flatnonzero(again)[0])}"
+    share = float(again.mean())
+    same = _same_as_before(channels) & again
+    if (same == again).all() or (same.any() and share <= FEW):
+        many = int(same.sum())
+        what = f"{many} {'line stands' if many == 1 else 'lines stand'} twice and are left out"
+        channels.findings.append(Finding("note" if same.mean() < 0.01 else "warn", what, where))
+        channels.select(~same)
+        again = again[~same]
+    if not again.any():
+        return
+    if share > FEW:
+        channels.t = _spread(t)
+        what = f"the clock is coarse: {share:.0%} of the stamps repeat; samples are spread between its ticks"
+    else:
+        what = f"{int(again.sum())} stamps repeat the one before and their samples are left out"
+        channels.select(~again)
+    channels.findings.append(Finding("warn", what, where, "let the logger stamp in microseconds"))
+
+
+def _same_as_before(channels: Channels) -> NDArray[np.bool_]:
+    """(N,) whether all readings repeat those of the row above."""
+    same = np.ones(len(channels.t), dtype=bool)
     for name in SENSORS:
         if (values := getattr(channels, name)) is not None:
             before = np.concatenate([values[:1], values[:-1]])
             same &= ((values == before) | (np.isnan(values) & np.isnan(before))).all(axis=1)
-    where = f"first at sample {int(np.flatnonzero(again)[0])}"
-    if same.any():
-        what = f"{int(same.sum())} lines stand twice and are left out"
-        channels.findings.append(Finding("note" if same.mean() < 0.01 else "warn", what, where))
-        channels.select(~same)
-        t = channels.t
-        again = np.concatenate([[False], np.diff(t) == 0])
-    share = float(again.mean())
-    if not share:
-        return
-    if share <= FEW:
-        what = f"{int(again.sum())} stamps repeat the one before and their samples are left out"
-        channels.findings.append(Finding("warn", what, where, "let the logger stamp in microseconds"))
-        channels.select(~again)
-        return
-    channels.t = _spread(t)
-    what = f"the clock is coarse: {share:.0%} of the stamps repeat; samples are spread evenly between ticks"
-    channels.findings.append(Finding("warn", what, where, "let the logger stamp in microseconds"))
+    return same
 
 
 def _spread(t: Stamps) -> Stamps:

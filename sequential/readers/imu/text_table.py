@@ -118,6 +118,8 @@ def table_of(text: str, where: str, is_header: Callable[[Sequence[str]], bool]) 
     body = kept[at + 1 :] if header else kept[at:]
     body = [(n, line) for n, line in body if not line.lstrip().startswith("#")]
     rows = [_trimmed(row) for row in _split([line for _, line in body], separator)]
+    if separator != ",":
+        rows = _with_points(rows)
     if header and rows and not any(_is_number(cell) for cell in rows[0]) and len(rows) > 1:
         rows, body = rows[1:], body[1:]  # a second line of header: units, or axes
     if not rows:
@@ -126,8 +128,6 @@ def table_of(text: str, where: str, is_header: Callable[[Sequence[str]], bool]) 
     for _, line in kept[:at]:
         key, _, value = line.strip('#" ').partition(_separator(line) or ":")
         preamble[key.strip().strip('"')] = value.strip().strip('"')
-    if separator != ",":
-        rows = _with_points(rows)
     return TextTable(where, tuple(header), rows, [n for n, _ in body], preamble)
 
 
