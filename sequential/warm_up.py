@@ -65,7 +65,14 @@ MODELS = (
     "exponential",
 )
 # loops that live beside the Python they serve
-BESIDE = ("sensors.allan_kernel",)
+BESIDE = (
+    "attitude.turning_kernel",
+    "attitude.mahony_kernel",
+    "attitude.madgwick_kernel",
+    "attitude.complementary_kernel",
+    "attitude.tilt_kernel",
+    "sensors.allan_kernel",
+)
 ROOMS = (*KERNELS, *BESIDE, *MODELS)
 
 

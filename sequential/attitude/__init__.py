@@ -3,16 +3,28 @@
 from sequential.attitude.angles import (
     attitude_from_angles,
     attitude_from_vectors,
+    body_rates,
     euler_rates,
     roll_pitch_yaw,
     tilt,
 )
+from sequential.attitude.complementary import ComplementaryAttitude
+from sequential.attitude.estimator import AttitudeFilter
 from sequential.attitude.history import AttitudeHistory
+from sequential.attitude.madgwick import Madgwick
+from sequential.attitude.mahony import Mahony
+from sequential.attitude.tilt_kalman import TiltKalman
 
 __all__ = [
+    "AttitudeFilter",
     "AttitudeHistory",
+    "ComplementaryAttitude",
+    "Madgwick",
+    "Mahony",
+    "TiltKalman",
     "attitude_from_angles",
     "attitude_from_vectors",
+    "body_rates",
     "euler_rates",
     "roll_pitch_yaw",
     "tilt",

@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.manifold.quaternion import quaternion_normalize
 
-__all__ = ["attitude_from_angles", "attitude_from_vectors", "euler_rates", "roll_pitch_yaw", "tilt"]
+__all__ = [
+    "attitude_from_angles",
+    "attitude_from_vectors",
+    "body_rates",
+    "euler_rates",
+    "roll_pitch_yaw",
+    "tilt",
+]
 
 Array = NDArray[np.float64]
 LEVEL = 1e-6
@@ -79,4 +86,13 @@ def euler_rates(angles: Array) -> Array:
     sr, cr, tangent = np.sin(roll), np.cos(roll), np.sin(pitch) / cosine
     one, zero = np.ones_like(roll), np.zeros_like(roll)
     rows = [[one, sr * tangent, cr * tangent], [zero, cr, -sr], [zero, sr / cosine, cr / cosine]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def body_rates(angles: Array) -> Array:
+    """Matrices (..., 3, 3) that turn rates of roll, pitch and yaw into rates about the body's axes."""
+    roll, pitch = angles[..., 0], angles[..., 1]
+    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    one, zero = np.ones_like(roll), np.zeros_like(roll)
+    rows = [[one, zero, -sp], [zero, cr, sr * cp], [zero, -sr, cr * cp]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
