@@ -17,8 +17,10 @@ from sequential.sensors.dwells import Dwells, find_dwells
 from sequential.sensors.estimate import Estimate
 from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY, local_gravity
+from sequential.sensors.imu_noise import ImuNoiseReport, imu_noise
 from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, stationary, tumble, waypoints
 from sequential.sensors.multi_position import AccelerometerFit, MultiPosition
+from sequential.sensors.noise_fit import Coefficient, NoiseFit, fit_noise
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simulate_imu
 from sequential.sensors.still import StillDetector
@@ -30,16 +32,19 @@ __all__ = [
     "AffineCalibration",
     "AllanDeviation",
     "Characteristics",
+    "Coefficient",
     "Dwells",
     "Estimate",
     "Finding",
     "ImuCalibration",
     "ImuErrors",
+    "ImuNoiseReport",
     "ImuRecording",
     "ImuSimulation",
     "ImuTruth",
     "Motion",
     "MultiPosition",
+    "NoiseFit",
     "StepResponse",
     "StillDetector",
     "allan_deviation",
@@ -47,6 +52,8 @@ __all__ = [
     "characterize",
     "constant_rate",
     "find_dwells",
+    "fit_noise",
+    "imu_noise",
     "kalibr_yaml",
     "local_gravity",
     "simulate_imu",

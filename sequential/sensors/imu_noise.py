@@ -1,0 +1,147 @@
+"""From a still recording of an IMU to the four numbers that a filter asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import DataError, MissingStreamError
+from sequential.noise import ImuNoise
+from sequential.sensors.allan import AllanDeviation, allan_deviation
+from sequential.sensors.noise_fit import FEWEST, NoiseFit, fit_noise
+from sequential.sensors.recording import ImuRecording
+
+__all__ = ["ImuNoiseReport", "imu_noise", "longest_even_stretch"]
+
+Array = NDArray[np.float64]
+PAUSE = 5.5  # intervals: a few lost samples shift the noise in time, which no spectrum notices
+SAME_RATE = 1.1
+CHUNKS = 16
+UNITS = {"gyro": "rad/s", "accel": "m/s²"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImuNoiseReport:
+    """Noise of an IMU at rest.
+
+    Parameters
+    ----------
+    noise : for `Strapdown` and Kalibr: the root mean square over the axes of each sensor; None where the
+        recording lacks the gyro or the accelerometer
+    bounds : fields of `noise` that are upper bounds, since no axis shows a random walk
+    fits : three axes of each sensor, "gyro" and "accel"
+    deviations : overlapping Allan deviation of each sensor, (T, 3)
+    rate, duration : of the stretch that was used, Hz and s
+    notes : sentences about the recording; those about an axis are in its fit
+    """
+
+    noise: ImuNoise | None
+    bounds: tuple[str, ...]
+    fits: dict[str, tuple[NoiseFit, NoiseFit, NoiseFit]]
+    deviations: dict[str, AllanDeviation]
+    rate: float
+    duration: float
+    notes: tuple[str, ...]
+
+
+def imu_noise(recording: ImuRecording) -> ImuNoiseReport:
+    """Noise densities and bias walks of an IMU from a recording at rest, the longer the better.
+
+    Parameters
+    ----------
+    recording : at rest, in SI units; gyro, accelerometer, or both
+
+    Raises
+    ------
+    DataError, MissingStreamError
+        where it is not in SI units, its rate changes, or no stretch without a pause is long enough.
+
+    Notes
+    -----
+    Of axes that show a random walk, the root mean square counts; where none does, that of the upper bounds,
+    which no recording of this length can tell from the truth.
+    """
+    sensors = [name for name in UNITS if getattr(recording, name) is not None]
+    if not sensors:
+        raise MissingStreamError(f"recording {recording.name!r} has neither gyro nor accelerometer")
+    recording.require(*sensors)
+    stretch, notes = longest_even_stretch(recording)
+    rate = (len(stretch) - 1) / stretch.duration
+    fits, deviations = {}, {}
+    for name in sensors:
+        values: Array = getattr(stretch, name)
+        deviations[name] = allan_deviation(values, rate)
+        x, y, z = (_fit_axis(values[:, axis], rate, name, axis, recording.name) for axis in range(3))
+        fits[name] = (x, y, z)
+    noise, bounds = None, []
+    if len(sensors) == 2:
+        numbers = {}
+        for name in sensors:
+            numbers[f"{name}_density"] = _together(fits[name], "N")[0]
+            numbers[f"{name}_bias_walk"], seen = _together(fits[name], "K")
+            if not seen:
+                bounds.append(f"{name}_bias_walk")
+        noise = ImuNoise(**numbers)
+    return ImuNoiseReport(noise, tuple(bounds), fits, deviations, rate, stretch.duration, tuple(notes))
+
+
+def _fit_axis(values: Array, rate: float, sensor: str, axis: int, name: str) -> NoiseFit:
+    try:
+        return fit_noise(values, rate, unit=UNITS[sensor])
+    except DataError as fault:
+        raise DataError(f"{sensor} {'xyz'[axis]} of recording {name!r}: {fault}") from None
+
+
+def _together(fits: tuple[NoiseFit, ...], term: Literal["N", "K"]) -> tuple[float, bool]:
+    """One number for three axes, and whether it was seen on any."""
+    seen = [fit[term].value for fit in fits if fit[term].visible]
+    values = seen or [fit[term].high for fit in fits]
+    return float(np.sqrt(np.mean(np.square(values)))), bool(seen)
+
+
+def longest_even_stretch(recording: ImuRecording) -> tuple[ImuRecording, list[str]]:
+    """The longest part without a pause of more than five intervals, and what is to be said about the rest.
+
+    Raises
+    ------
+    DataError
+        where that part has fewer than 64 samples, or its rate changes.
+    """
+    dt = recording.dt
+    if len(dt) < FEWEST - 1:
+        raise DataError(
+            f"recording {recording.name!r} has {len(recording)} samples; reading its noise needs {FEWEST} at "
+            "least, and minutes to see more than white noise"
+        )
+    pauses = np.flatnonzero(dt > PAUSE * np.median(dt))
+    starts, stops = np.concatenate([[0], pauses + 1]), np.concatenate([pauses + 1, [len(recording)]])
+    longest = int(np.argmax(stops - starts))
+    stretch = recording.select(slice(int(starts[longest]), int(stops[longest])))
+    if len(stretch) < FEWEST:
+        raise DataError(
+            f"recording {recording.name!r} pauses {len(pauses)} times, and no stretch between has {FEWEST} "
+            "samples; record without pauses"
+        )
+    medians = np.array(
+        [np.median(part) for part in np.array_split(stretch.dt, min(CHUNKS, len(stretch) // 8))]
+    )
+    if medians.max() > SAME_RATE * medians.min():
+        raise DataError(
+            f"the rate of recording {recording.name!r} changes from {1 / medians.min():.4g} to "
+            f"{1 / medians.max():.4g} Hz; give a part of one rate, as recording.slice(start_s, stop_s)"
+        )
+    notes = []
+    if len(pauses):
+        notes.append(
+            f"The recording pauses {len(pauses)} times; the longest stretch without a pause, "
+            f"{stretch.duration:.4g} s of {recording.duration:.4g} s, was used."
+        )
+    lost = int(np.sum(np.round(stretch.dt / np.median(stretch.dt)) - 1))
+    if lost > 0.001 * len(stretch):
+        notes.append(
+            f"{lost} of {len(stretch) + lost} samples are missing; the others were taken as evenly spaced."
+        )
+    return stretch, notes
