@@ -1,4 +1,4 @@
-"""`factorlab info`: what a log holds, and what is wrong with it."""
+"""`factorlab info`: what a log or a recording holds, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import in_one_sentence
+from factorlab.cli.recording import recording_options
 from factorlab.cli.settings import as_json, print_json
 
 if TYPE_CHECKING:
@@ -17,12 +18,19 @@ __all__ = ["info"]
 GAP_FACTOR = 5.0  # a pause of more than this many median intervals is worth a line
 
 
-@click.command(short_help="What a log holds: streams, rates, gaps, order.")
-@click.argument("source", metavar="DATASET|LOG")
+@click.command(short_help="What a log or an IMU recording holds, and what is wrong with it.")
+@click.argument("source", metavar="DATASET|LOG|RECORDING")
+@recording_options
 @as_json
 @in_one_sentence
-def info(source: str, as_json: bool) -> int:
-    """List the streams of a CSV or NPZ log (or of a dataset) with counts, rates, gaps and disorder."""
+def info(source: str, as_json: bool, **options: Any) -> int:
+    """List the streams of a CSV or NPZ log (or of a dataset) with counts, rates, gaps and disorder.
+
+    Of a recording of an IMU (a file, the folder or zip of a phone's export, or a name such as broad:07), say
+    its health as well: saturated or stuck axes, units that contradict gravity, pauses, and so on.
+    """
+    if any(options.values()) or _is_recording(source):
+        return _tell_recording(source, as_json, options)
     logs = _logs(source)
     found = {log.name: {name: _summary(stream) for name, stream in log.items()} for log in logs}
     if as_json:
@@ -32,6 +40,45 @@ def info(source: str, as_json: bool) -> int:
         click.echo(log.name)
         for line in _table(found[log.name]):
             click.echo(f"  {line}")
+    return 0
+
+
+def _is_recording(source: str) -> bool:
+    """Whether a name or a file is a recording of an IMU rather than a log of streams."""
+    from pathlib import Path
+
+    from factorlab.datasets.recordings import RECORDINGS
+    from sequential.readers.imu import holds_imu
+
+    path = Path(source)
+    if path.exists():
+        return holds_imu(path)
+    return ":" in source or source in RECORDINGS
+
+
+def _tell_recording(source: str, as_json: bool, options: dict[str, Any]) -> int:
+    import numpy as np
+
+    from factorlab.datasets.recordings import open_recording
+    from sequential.sensors.health import inspect
+
+    recording, truth, path = open_recording(source, **options)
+    findings = inspect(recording)
+    streams = {name: _summary(stream) for name, stream in recording.to_log().items()}
+    units = {sensor: getattr(recording, f"{sensor}_unit") for sensor in recording.sensors}
+    seen = None if truth is None else int(np.isfinite(truth.world_q_body[:, 0]).sum())
+    if as_json:
+        told = [{k: getattr(f, k) for k in ("severity", "what", "where", "do")} for f in findings]
+        about = {"samples": len(recording), "rate_hz": recording.rate, "duration_s": recording.duration}
+        found = {"file": str(path), **about, "units": units, "with_truth": seen, "findings": told}
+        print_json({"schema": 1, "logs": {recording.name: streams}, "recordings": {recording.name: found}})
+        return 0
+    click.echo(f"{recording.name}: {recording.duration:.2f} s at {recording.rate:.5g} Hz ({path})")
+    click.echo("  " + ", ".join(f"{sensor} in {unit}" for sensor, unit in units.items()))
+    if seen is not None:
+        click.echo(f"  with the true attitude of {seen} of {len(recording)} samples")
+    for line in [*_table(streams), *(f"{finding.severity}: {finding}" for finding in findings)]:
+        click.echo(f"  {line}")
     return 0
 
 

@@ -12,9 +12,10 @@ from sequential.errors import DataError, FileFormatError
 from sequential.readers.broad import is_broad, read_broad
 from sequential.readers.files import require_file
 from sequential.readers.imu.archive import Export, open_export
-from sequential.readers.imu.arrays import array_channels, imu_tk_channels, is_imu_tk_text
+from sequential.readers.imu.arrays import array_channels, imu_tk_channels
 from sequential.readers.imu.assemble import Channels, assemble
 from sequential.readers.imu.csv_file import Columns, channels_of, names_sensors, sensor_table
+from sequential.readers.imu.detect import found_out
 from sequential.readers.imu.phone import is_phone_header, phone_channels, sensor_logger_json
 from sequential.readers.imu.text_table import decoded, table_of
 from sequential.readers.imu.ulog import ulog_channels
@@ -83,42 +84,9 @@ def read_imu(
     if rate is not None and not 0 < rate < float("inf"):
         raise DataError(f"the rate of a recording is a positive number of Hz, got {rate}")
     request = _Request(parse_units(units), columns, rate, name or place.stem)
-    recording = KINDS[kind or _found_out(place)](place, request)
+    found = kind or found_out(place)
+    recording = (_only_table if found == "alone" else KINDS[found])(place, request)
     return recording if name is None else replace(recording, name=name)
-
-
-def _found_out(place: Path) -> str:
-    """The kind of a file by its name, and of a folder by what is in it."""
-    if place.is_dir():
-        return _export_kind(open_export(place), place)
-    ending = place.suffix.lower()
-    by_ending = {
-        ".zip": "zip",
-        ".npz": "npz",
-        ".ulg": "ulog",
-        ".h5": "broad",
-        ".hdf5": "broad",
-        ".json": "sensor_logger",
-    }
-    if ending in by_ending:
-        return _export_kind(open_export(place), place) if ending == ".zip" else by_ending[ending]
-    if is_imu_tk_text(place):
-        return "imu_tk"
-    return "broad" if ending == ".mat" else "csv"
-
-
-def _export_kind(export: Export, place: Path) -> str:
-    if export.find("imu0/data.csv") or (export.find("data.csv") and export.find("sensor.yaml")):
-        return "euroc"
-    if place.is_dir() and any(is_imu_tk_text(place / name) for name in export.inside if "/" not in name):
-        return "imu_tk"
-    if not export.names("csv"):
-        has = ", ".join(export.inside[:8]) or "nothing"
-        raise FileFormatError(
-            f"{place} holds {has}; expected are the CSV files of a phone's export (Accelerometer.csv, "
-            "Gyroscope.csv …; in phyphox choose CSV, not Excel) or EuRoC's mav0/imu0/data.csv"
-        )
-    return "phone"
 
 
 def _csv(place: Path, request: _Request) -> ImuRecording:
@@ -131,6 +99,11 @@ def _csv(place: Path, request: _Request) -> ImuRecording:
     if request.columns is None and is_phone_header(cells) and not names_sensors(cells):
         return _done(phone_channels(_alone(place), request.units.get("t")), request)
     return _table(place, request)
+
+
+def _only_table(place: Path, request: _Request) -> ImuRecording:
+    """The one table of a folder."""
+    return _csv(place / open_export(place).names("csv")[0], request)
 
 
 def _alone(place: Path) -> Export:

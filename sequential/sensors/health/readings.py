@@ -19,6 +19,7 @@ AXES = "xyz"
 STUCK_S, FEWEST_EQUAL = 2.0, 50  # s and samples: a run of equal values that is worth a word
 STUCK_SHARE = 0.2  # of the recording
 SATURATED_SHARE = 0.05  # of the samples, above which integrals are worthless
+STEEP = 5.0  # steps by which a clipped signal enters or leaves the end of its range, at least
 FINE_STEPS = 40  # an axis must span so many steps before its ends are believed to be stops
 
 
@@ -38,7 +39,7 @@ def reading_findings(recording: ImuRecording) -> list[Finding]:
         for axis in range(3):
             starts, lengths = _runs(values[:, [axis]])
             stretch = _longest((starts, lengths), seconds)
-            if stretch is not None and not (frozen and frozen[0] <= stretch[0] and stretch[1] <= frozen[1]):
+            if stretch is not None and not (frozen and _mostly(stretch, frozen)):
                 found.append(_stuck(f"{WORDS[sensor]} {AXES[axis]}", seconds, stretch))
             found += _saturated(f"{WORDS[sensor]} {AXES[axis]}", seconds, values[:, axis], starts, lengths)
         found += _coarse(recording, sensor, values)
@@ -67,6 +68,12 @@ def _longest(runs: tuple[Ints, Ints], seconds: Array) -> tuple[int, int] | None:
     if lengths[worst] < max(FEWEST_EQUAL, 10.0 * usual) or seconds[last] - seconds[first] < STUCK_S:
         return None
     return first, last
+
+
+def _mostly(part: tuple[int, int], whole: tuple[int, int]) -> bool:
+    """Whether nine tenths of a stretch lie in another one."""
+    shared = min(part[1], whole[1]) - max(part[0], whole[0])
+    return shared >= 0.9 * (part[1] - part[0])
 
 
 def _frozen(sensor: str, seconds: Array, stretch: tuple[int, int]) -> list[Finding]:
@@ -105,7 +112,7 @@ def _saturated(name: str, seconds: Array, values: Array, starts: Ints, lengths: 
     found = []
     for stop in (values.max(), values.min()):
         at_stop = held == stop
-        long = at_stop & (lengths >= max(3.0, 2.0 * usual))
+        long = at_stop & (lengths >= max(3.0, 2.0 * usual)) & _abrupt(values, starts, lengths, STEEP * step)
         many = int(lengths[at_stop].sum())
         if not long.any() or many < 5:
             continue
@@ -116,6 +123,13 @@ def _saturated(name: str, seconds: Array, values: Array, starts: Ints, lengths: 
         severity: Severity = "fail" if many > SATURATED_SHARE * len(values) else "warn"
         found.append(Finding(severity, what, f"first at {where}", do))
     return found
+
+
+def _abrupt(values: Array, starts: Ints, lengths: Ints, least: float) -> NDArray[np.bool_]:
+    """Runs that are entered or left by a jump; a smooth peak is flat as well, but has gentle flanks."""
+    before = np.abs(values[np.maximum(starts - 1, 0)] - values[starts])
+    after = np.abs(values[np.minimum(starts + lengths, len(values) - 1)] - values[starts])
+    return np.asarray(np.maximum(before, after) >= least)
 
 
 def _step(values: Array) -> float:
@@ -149,8 +163,9 @@ def _repeated(recording: ImuRecording) -> list[Finding]:
     if not inertial:
         return []
     table = np.hstack(inertial)
-    same = (table[1:] == table[:-1]).all(axis=1)
-    share = float(same.mean())
+    lengths = _runs(table)[1]
+    lengths = lengths[lengths < FEWEST_EQUAL]  # a stall is told elsewhere
+    share = 1.0 - len(lengths) / max(int(lengths.sum()), 1)
     if not 0.1 < share < 1.0:
         return []
     own = recording.rate * (1.0 - share)

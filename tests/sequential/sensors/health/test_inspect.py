@@ -95,6 +95,18 @@ def test_saturated_axis(sound):
     assert_told(clipped, "warn", f"gyro x saturates at {edge:.5g}")
 
 
+def test_a_smooth_peak_is_no_saturation():
+    """Without noise, a quantised peak is flat for some samples, and yet no end of a range."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        quiet = ImuErrors(gyro_lsb=1e-3, accel_lsb=1e-2)
+        assert not [
+            text
+            for text in told(simulate_imu(tumble(20.0, rng), rng, errors=quiet).recording)
+            if "satur" in text
+        ]
+
+
 def test_stuck_axis(sound):
     assert_told(
         changed(sound, "accel", lambda v: v[:, 1].fill(0.3)), "fail", "accelerometer y is stuck: one value"
