@@ -128,17 +128,17 @@ def _measured(phase: Array, rate: float, kind: Kind, m: NDArray[np.int64], *, fl
 
 
 def _colours(phase: Array, m: NDArray[np.int64], order: int) -> NDArray[np.int64]:
-    """(T, k) exponents of the rate's spectrum; few averages left: that of the longest τ with enough."""
+    """(T, k) exponents of the rate's spectrum; where averages are too few, that of the five before."""
     from sequential.sensors.allan_kernel import lag_one
 
     found = np.empty((len(m), len(phase)))
     lag_one(phase, m, order, found)
-    for row in range(len(m)):
-        unknown = np.isnan(found[row])
-        found[row, unknown] = (
-            found[row - 1, unknown] if row else -2.0
-        )  # too short for anything: take it as white
-    return np.clip(np.round(found) + 2, LOWEST_COLOUR[order], 2).astype(np.int64)
+    alpha = np.clip(np.round(found) + 2, LOWEST_COLOUR[order], 2)
+    known = np.isfinite(found[:, 0])
+    # a record that is too short for any is taken as white
+    last = np.round(np.median(alpha[known][-5:], axis=0)) if known.any() else np.zeros(len(phase))
+    alpha[~known] = last
+    return alpha.astype(np.int64)
 
 
 def averaging_factors(count: int, rate: float, span: int, taus: ArrayLike | None) -> NDArray[np.int64]:

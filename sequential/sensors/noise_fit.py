@@ -27,8 +27,9 @@ NAMES: dict[Term, str] = {
     "R": "drift",
 }
 FEWEST = 64
-# Records of this many N²/B² or N/K seconds show flicker or a random walk nine times in ten (Monte Carlo).
-ENOUGH = {"B": 100.0, "K": 80.0}
+# Records of 100 N²/B² seconds show flicker, of 80 N/K and 50 B²/K² a random walk, nine times in ten, by Monte
+# Carlo.
+FLICKER_IN_WHITE, WALK_IN_WHITE, WALK_IN_FLICKER = 100.0, 80.0, 50.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +94,10 @@ class NoiseFit:
     def seconds_needed(self, term: Literal["B", "K"], value: float) -> float:
         """Length of a still record that would show a coefficient of this value nine times in ten, s."""
         white = self.N.value if self.N.visible else self.N.high
-        return ENOUGH[term] * (white / value) ** (2 if term == "B" else 1)
+        if term == "B":
+            return FLICKER_IN_WHITE * (white / value) ** 2
+        flicker = self.B.value if self.B.visible else 0.0
+        return max(WALK_IN_WHITE * white / value, WALK_IN_FLICKER * (flicker / value) ** 2)
 
     @property
     def notes(self) -> tuple[str, ...]:

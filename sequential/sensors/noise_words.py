@@ -42,10 +42,13 @@ def notes(fit: NoiseFit) -> tuple[str, ...]:
     for term, name in slow:
         if not fit[term].visible:
             most = fit[term].high
-            half = span(fit.seconds_needed(term, 0.5 * most))
+            needed = fit.seconds_needed(term, 0.5 * most)
+            # flicker under a random walk stays hidden, however long the record
+            more = f" To see one of half that size, record for about {span(needed)}."
+            hidden = needed < 1.5 * fit.duration or (term == "B" and fit.K.visible)
             said.append(
-                f"{name} is not visible in {span(fit.duration)}: at most {_amount(fit, term, most)} (95 %). "
-                f"To see one of half that size, record for about {half}."
+                f"{name} is not visible in {span(fit.duration)}: at most {_amount(fit, term, most)} (95 %)."
+                f"{'' if hidden else more}"
             )
     if fit.Q.visible:
         said.append(

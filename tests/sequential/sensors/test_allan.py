@@ -95,7 +95,7 @@ def test_degrees_of_freedom_are_greenhall_s(overlapping, modified):
 @pytest.mark.parametrize("kind", KINDS)
 def test_intervals_are_those_of_allantools(kind, rng):
     x = all_sorts(rng, 4000)
-    ours = allan_deviation(x, RATE, kind, taus=[0.02, 0.2, 1.0, 2.0])
+    ours = allan_deviation(x, RATE, kind, taus=[0.02, 0.2, 0.4, 0.6])
     phase = allantools.frequency2phase(x, RATE)
     name = {"overlapping": "oadev", "hadamard": "ohdev", "modified": "mdev", "plain": "adev"}[kind]
     for row, tau in enumerate(ours.tau):
@@ -108,7 +108,7 @@ def test_intervals_are_those_of_allantools(kind, rng):
 @pytest.mark.parametrize(("signal", "alpha"), [(white, 0), (random_walk, -2)])
 def test_the_colour_is_recognised(signal, alpha, rng):
     found = allan_deviation(np.stack([signal(rng, 30_000) for _ in range(4)], axis=1), RATE)
-    assert np.mean(found.alpha[found.tau < 10.0] == alpha) > 0.95
+    assert np.mean(found.alpha == alpha) > 0.95
 
 
 @pytest.mark.parametrize("kind", KINDS)
