@@ -6,6 +6,7 @@ Exit codes: 0 ok, 1 the data are at fault, 2 the command line is, 3 (only with -
 import click
 
 from factorlab.cli.calibrate import calibrate
+from factorlab.cli.characterize import characterize
 from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
@@ -40,5 +41,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, calibrate, info, doctor):
+for command in (demo, compare, tune, characterize, calibrate, info, doctor):
     main.add_command(command)

@@ -89,6 +89,7 @@ class Section:
     table: Table | None = None
     figure: Figure | Callable[[], Figure | None] | None = None
     caption: str = ""  # how the figure is read
+    page_only: bool = False  # a table that a terminal has no room for
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,7 +19,7 @@ def document_lines(document: Document) -> Iterable[str]:
         yield from wrap(document.lead, WIDTH)
     yield ""
     for section in document.sections:
-        if section.table is not None:
+        if section.table is not None and not section.page_only:
             yield f"{section.table.caption or section.heading}:"
             yield from table_lines(section.table, document.lang)
             yield ""

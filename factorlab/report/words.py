@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from factorlab.compare.text import band, figure
+from factorlab.compare.text import figure
 
 __all__ = ["WORDS", "Language", "PageWords", "interval", "number"]
 
@@ -70,11 +70,13 @@ def number(
     return text.replace(".", ",") if lang == "fr" else text
 
 
-def interval(limits: tuple[float, float] | None, lang: Language = "en", digits: int = 3) -> str:
-    """Both ends of an interval, `–` where there is none."""
+def interval(limits: tuple[float, float] | None, lang: Language = "en") -> str:
+    """Both ends of an interval, `–` where there is none, with digits enough to tell them apart."""
     if limits is None:
         return number(None)
-    if lang == "en" and digits == 3:
-        return band(limits)
     between = WORDS[lang].between[min(limits) < 0]
-    return between.join(number(float(end), lang, digits) for end in limits)
+    written = [number(float(end), lang) for end in limits]
+    for digits in range(4, 7):
+        if written[0] == written[1]:
+            written = [number(float(end), lang, digits) for end in limits]
+    return between.join(written)

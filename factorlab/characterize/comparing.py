@@ -1,0 +1,54 @@
+"""Noise as a filter has it declared, beside noise as the sensor shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from factorlab.characterize.engine import Study
+from factorlab.characterize.words import say
+from factorlab.report.document import Status, Verdict
+from factorlab.report.words import Language
+
+__all__ = ["against_declared"]
+
+NEAR = 1.5  # a ratio of variances up to which R is right enough
+FAR = 4.0  # too small by more than this misleads a filter
+
+
+def against_declared(study: Study, lang: Language) -> Iterator[Verdict]:
+    """One verdict for each channel whose noise was declared: the ratio of measured to declared variance."""
+    for channel, one in zip(study.channels, study.axes, strict=True):
+        declared = study.declared.sigma_of(channel)
+        if declared is None or one.stuck:
+            continue
+        sigma = one.noise.sigma
+        ratio = sigma.scaled(1.0 / declared)
+        band = ratio.low**2, ratio.high**2
+        words, status = _judged(ratio.value**2, band, channel.name, declared, sigma.value, one.unit, lang)
+        yield Verdict(say(lang, "declared", axis=channel.name), ratio.value**2, band, status, *words)
+
+
+def _judged(
+    ratio: float,
+    band: tuple[float, float],
+    axis: str,
+    declared: float,
+    sigma: float,
+    unit: str,
+    lang: Language,
+) -> tuple[tuple[str, str], Status]:
+    """Words and status for a ratio of variances."""
+    remedy = say(lang, "r_do", r=sigma**2, sigma=sigma, unit=unit)
+    if ratio > NEAR and band[0] > 1.0:
+        words = say(lang, "r_small", x=_round(ratio, lang), axis=axis)
+        return (words, remedy), "FAIL" if ratio > FAR else "WARN"
+    if ratio < 1.0 / NEAR and band[1] < 1.0:
+        words = say(lang, "r_large", x=_round(1.0 / ratio, lang), axis=axis, nis=ratio)
+        return (words, remedy), "WARN"
+    return (say(lang, "r_fits", declared=declared, measured=sigma, unit=unit), ""), "PASS"
+
+
+def _round(times: float, lang: Language) -> str:
+    """A factor as people say it: 8.2, 15, 230."""
+    text = f"{times:.2g}" if times < 10.0 else f"{times:.0f}"
+    return text.replace(".", ",") if lang == "fr" else text

@@ -1,0 +1,84 @@
+"""A study as a document: verdicts, tables, figures, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from factorlab.characterize.comparing import against_declared
+from factorlab.characterize.engine import Study
+from factorlab.characterize.stepping import of_steps
+from factorlab.characterize.tables import sections_at_rest, sections_of_steps
+from factorlab.characterize.verdicts import at_rest
+from factorlab.characterize.words import say
+from factorlab.report.document import Document, Status, Verdict
+from factorlab.report.words import Language
+from sequential.sensors import Finding
+
+__all__ = ["document_of"]
+
+SEVERITY: dict[str, Status] = {"note": "INFO", "warn": "WARN", "fail": "FAIL"}
+ORDER = {"FAIL": 0, "WARN": 1, "PASS": 2, "INFO": 3}
+
+
+def document_of(study: Study, *, lang: Language = "en", command: str = "") -> Document:
+    """Everything that a study has to say, worst verdicts first."""
+    told = of_steps(study, lang) if study.steps else (*against_declared(study, lang), *at_rest(study, lang))
+    verdicts = [*_findings(study.findings, lang), *told]
+    sections = sections_of_steps(study, lang) if study.steps else sections_at_rest(study, lang)
+    return Document(
+        title=say(lang, "title", name=study.name),
+        lead=_lead(study, lang),
+        verdicts=tuple(sorted(verdicts, key=lambda one: ORDER[one.verdict])),
+        sections=tuple(sections),
+        numbers=_numbers(study),
+        lang=lang,
+        command=command,
+    )
+
+
+def _lead(study: Study, lang: Language) -> str:
+    n = max(len(channel.t) for channel in study.channels)
+    if not study.axes:
+        return say(lang, "lead_step", n=n)
+    rate = study.axes[0].timing.rate
+    if study.window is None:
+        return say(lang, "lead_whole", n=n, rate=rate, duration=study.duration)
+    start, stop = study.window[0], min(study.window[1], study.duration)
+    return say(lang, "lead_part", n=n, rate=rate, start=start, stop=stop, duration=stop - start)
+
+
+def _findings(findings: tuple[Finding, ...], lang: Language) -> Iterator[Verdict]:
+    for one in findings:
+        where = f" ({one.where})" if one.where else ""
+        yield Verdict(
+            say(lang, "recording"), None, None, SEVERITY[one.severity], f"{one.what}{where}", one.do
+        )
+
+
+def _numbers(study: Study) -> dict[str, Any]:
+    """What `--json` prints beside the verdicts."""
+    plain: dict[str, Any] = {
+        "recording": study.name,
+        "window": study.window,
+        "duration": study.duration,
+        "findings": [
+            {"severity": one.severity, "what": one.what, "where": one.where, "do": one.do}
+            for one in study.findings
+        ],
+    }
+    if study.steps:
+        names = [channel.name for channel in study.channels]
+        return plain | {"steps": {n: one.to_json() for n, one in zip(names, study.steps, strict=True)}}
+    timing = study.axes[0].timing
+    plain["timing"] = {
+        "rate": timing.rate,
+        "mean_rate": timing.mean_rate,
+        "jitter": timing.jitter,
+        "worst": timing.worst,
+        "gaps": timing.gaps.tolist(),
+        "missing": timing.missing,
+        "repeated": timing.repeated,
+        "computed": timing.computed,
+    }
+    return plain | {"axes": {one.name: one.to_json() for one in study.axes}}

@@ -1,0 +1,162 @@
+"""Tables and figures of a study, section by section."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from factorlab.characterize.engine import Study
+from factorlab.characterize.words import say
+from factorlab.report.document import Cell, Section, Table
+from factorlab.report.words import Language, interval
+from sequential.sensors import Characteristics, Estimate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["sections_at_rest", "sections_of_steps"]
+
+Column = tuple[str, Callable[[Characteristics], Cell]]
+FACTORS = (4, 16, 64)
+
+
+def sections_at_rest(study: Study, lang: Language) -> Iterator[Section]:
+    """Overview, noise, histogram, drift, resolution, spectrum, outliers and timing."""
+    yield Section("Axes" if lang == "en" else "Axes de mesure", table=_table(study, lang, OVERVIEW))
+    for name, columns, figure in (
+        ("noise", _noise(lang), ""),
+        ("histogram", NORMALITY, "histograms"),
+        ("drift", _levels(lang), "drift"),
+        ("resolution", RESOLUTION, "oversampling"),
+        ("spectrum", (), "spectra"),
+        ("timing", TIMING, ""),
+    ):
+        yield Section(
+            say(lang, f"section_{name}"),
+            say(lang, f"section_{name}_text") if name != "timing" else "",
+            table=_table(study, lang, columns, name) if columns else None,
+            figure=_drawn(study, lang, figure) if figure else None,
+            page_only=True,
+        )
+
+
+def _drawn(study: Study, lang: Language, name: str) -> Callable[[], Figure | None]:
+    def draw() -> Figure | None:
+        from factorlab.report import sensor_figures
+
+        made: Figure = getattr(sensor_figures, name)(study, lang)()
+        return made
+
+    return draw
+
+
+def _table(study: Study, lang: Language, columns: tuple[Column, ...], name: str = "") -> Table:
+    rows = tuple(
+        (
+            one.name,
+            one.unit,
+            *(cell(one) for _, cell in columns),
+            *(_gains(one) if name == "resolution" else ()),
+        )
+        for one in study.axes
+    )
+    heads = [say(lang, f"h_{key}") for key in ("axis", "unit", *(key for key, _ in columns))]
+    if name == "resolution":
+        heads += [say(lang, "h_gain", factor=factor) for factor in FACTORS]
+    return Table(tuple(heads), rows)
+
+
+def _gains(one: Characteristics) -> tuple[Cell, ...]:
+    """Bits gained by the factors of the table, where the recording is long enough for them."""
+    found = dict(zip(one.oversampling.factor.tolist(), one.oversampling.bits.tolist(), strict=True))
+    return tuple(found.get(factor) for factor in FACTORS)
+
+
+OVERVIEW: tuple[Column, ...] = (
+    ("sigma", lambda one: one.noise.sigma.value),
+    ("bias", lambda one: one.bias.value),
+    ("drift", lambda one: one.drift.value * 3600.0),
+    ("lsb", lambda one: one.resolution.lsb or None),
+    ("effective", lambda one: one.resolution.effective_bits),
+    ("outliers", lambda one: one.outliers.count),
+    ("density", lambda one: one.spectrum.noise_density),
+)
+NORMALITY: tuple[Column, ...] = (
+    ("skewness", lambda one: one.distribution.skewness.value),
+    ("kurtosis", lambda one: one.distribution.kurtosis.value),
+    ("distance", lambda one: one.distribution.distance),
+    ("p", lambda one: one.distribution.p),
+)
+RESOLUTION: tuple[Column, ...] = (
+    ("lsb", lambda one: one.resolution.lsb or None),
+    ("noise_bits", lambda one: one.resolution.noise_bits),
+    ("effective", lambda one: one.resolution.effective_bits),
+)
+TIMING: tuple[Column, ...] = (
+    ("outliers", lambda one: one.outliers.count),
+    ("hour", lambda one: one.outliers.per_hour),
+    ("typical", lambda one: one.outliers.typical),
+    ("largest", lambda one: one.outliers.largest),
+    ("rate", lambda one: one.timing.rate),
+    ("jitter", lambda one: 1e3 * one.timing.jitter),
+    ("gaps", lambda one: len(one.timing.gaps)),
+    ("missing", lambda one: one.timing.missing),
+)
+
+
+def _ends(of: Estimate | None, lang: Language) -> str:
+    return interval(None if of is None else (of.low, of.high), lang)
+
+
+def _noise(lang: Language) -> tuple[Column, ...]:
+    return (
+        ("sigma", lambda one: one.noise.sigma.value),
+        ("interval", lambda one: _ends(one.noise.sigma, lang)),
+        ("step_sigma", lambda one: one.noise.step_sigma),
+        ("correlation", lambda one: one.noise.correlation),
+        ("n", lambda one: one.noise.n),
+        ("effective_n", lambda one: round(one.noise.n_effective)),
+        ("density", lambda one: one.spectrum.noise_density),
+    )
+
+
+def _levels(lang: Language) -> tuple[Column, ...]:
+    return (
+        ("bias", lambda one: one.bias.value),
+        ("interval", lambda one: _ends(one.bias, lang)),
+        ("drift", lambda one: one.drift.value * 3600.0),
+        ("interval", lambda one: _ends(one.drift.scaled(3600.0), lang)),
+        ("heat", lambda one: None if one.per_degree is None else one.per_degree.value),
+        ("interval", lambda one: _ends(one.per_degree, lang)),
+    )
+
+
+def sections_of_steps(study: Study, lang: Language) -> Iterator[Section]:
+    """One table and one figure of every step."""
+    keys = ("axis", "unit", "order", "size", "latency", "tau", "rise", "bandwidth", "overshoot")
+    rows = tuple(
+        (
+            channel.name,
+            channel.unit,
+            one.order,
+            one.size.value,
+            None if one.latency is None else 1e3 * one.latency.value,
+            1e3 * one.time_constant.value,
+            1e3 * one.rise.value,
+            one.bandwidth.value,
+            100.0 * one.overshoot,
+        )
+        for channel, one in zip(study.channels, study.steps, strict=True)
+    )
+
+    def draw() -> Figure | None:
+        from factorlab.report.sensor_figures import steps
+
+        return steps(study, lang)()
+
+    yield Section(
+        say(lang, "section_step"),
+        say(lang, "section_step_text"),
+        Table(tuple(say(lang, f"h_{key}") for key in keys), rows),
+        draw,
+    )

@@ -1,0 +1,262 @@
+"""What the numbers of a study mean, sensor by sensor, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from factorlab.characterize.engine import Study
+from factorlab.characterize.words import group_name, say
+from factorlab.report.document import Status, Verdict
+from factorlab.report.words import Language, number
+from sequential.sensors import Characteristics, Estimate
+
+__all__ = ["at_rest"]
+
+Axes = list[Characteristics]
+STANDARD_GRAVITY = 9.80665
+TURN = np.radians(0.05)  # rad/s of gyro bias below which nobody minds
+OFF_GRAVITY = 0.01
+LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
+LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
+LOUD = 0.02  # share of the noise power in a line that is worth a warning
+LATE = 0.05  # jitter over the interval
+
+
+def at_rest(study: Study, lang: Language) -> Iterator[Verdict]:
+    """Noise, bias, drift, resolution, distribution, outliers, timing and lines of each sensor."""
+    for group, rows in study.groups().items():
+        axes = [study.axes[k] for k in rows]
+        if stuck := [one for one in axes if one.stuck]:
+            yield from (_stuck(one, lang) for one in stuck)
+            axes = [one for one in axes if not one.stuck]
+        if axes:
+            yield _sigma(axes, group, lang)
+            yield from _level(axes, group, lang)
+            for about in (_drift, _heat, _resolution, _normal):
+                yield from about(axes, lang)
+            for of_group in (_outliers, _timing):
+                yield of_group(axes, group, lang)
+            yield from _line(axes, lang)
+
+
+def _worst(axes: Axes, by: Callable[[Characteristics], float]) -> Characteristics:
+    return max(axes, key=by)
+
+
+def _stuck(one: Characteristics, lang: Language) -> Verdict:
+    words = say(lang, "stuck"), say(lang, "stuck_do")
+    return Verdict(say(lang, "sigma", axis=one.name), 0.0, None, "FAIL", *words, unit=one.unit)
+
+
+def _sigma(axes: Axes, group: str, lang: Language) -> Verdict:
+    one = _worst(axes, lambda axis: axis.noise.sigma.value)
+    noise = one.noise
+    key = "sigma_white" if noise.white else "sigma_coloured"
+    meaning = say(
+        lang,
+        key,
+        group=group_name(group, lang),
+        corr=noise.correlation,
+        r=noise.sigma.value**2,
+        unit=one.unit,
+        n=noise.n,
+        eff=round(noise.n_effective),
+    )
+    status: Status = "PASS" if noise.white else "WARN"
+    action = "" if noise.white else say(lang, "sigma_coloured_do")
+    return _line_of(say(lang, "sigma", axis=one.name), noise.sigma, status, meaning, action, one.unit)
+
+
+def _line_of(metric: str, of: Estimate, status: Status, meaning: str, action: str, unit: str) -> Verdict:
+    return Verdict(metric, of.value, (of.low, of.high), status, meaning, action, unit)
+
+
+def _level(axes: Axes, group: str, lang: Language) -> Iterator[Verdict]:
+    """Bias of a gyro, size of gravity, or just the mean."""
+    if group == "gyro" and axes[0].unit == "rad/s":
+        one = _worst(axes, lambda axis: abs(axis.bias.value))
+        degrees = float(np.degrees(abs(one.bias.value)))
+        meaning = say(lang, "bias_gyro", deg=degrees, minute=60.0 * degrees)
+        large = abs(one.bias.value) > TURN
+        action = say(lang, "bias_gyro_do") if large else ""
+        yield _line_of(
+            say(lang, "bias", axis=one.name), one.bias, "WARN" if large else "PASS", meaning, action, one.unit
+        )
+    elif group == "accel" and axes[0].unit == "m/s²" and len(axes) == 3:
+        yield _gravity(axes, lang)
+    else:
+        for one in axes[:1] if group not in {"accel", "gyro", "mag"} else ():
+            meaning = say(lang, "mean_means", half=0.5 * (one.bias.high - one.bias.low))
+            yield _line_of(say(lang, "mean", axis=one.name), one.bias, "INFO", meaning, "", one.unit)
+
+
+def _gravity(axes: Axes, lang: Language) -> Verdict:
+    mean = np.array([one.bias.value for one in axes])
+    half = np.array([0.5 * (one.bias.high - one.bias.low) for one in axes])
+    norm = float(np.linalg.norm(mean))
+    wide = float(np.sqrt(np.sum((mean * half) ** 2))) / norm if norm else 0.0
+    off = abs(norm / STANDARD_GRAVITY - 1.0)
+    fits = off < OFF_GRAVITY
+    meaning = say(lang, "accel_fits" if fits else "accel_off", percent=100.0 * off)
+    return Verdict(
+        say(lang, "norm_accel"),
+        norm,
+        (norm - wide, norm + wide),
+        "PASS" if fits else "WARN",
+        meaning,
+        "" if fits else say(lang, "accel_do"),
+        "m/s²",
+    )
+
+
+def _drift(axes: Axes, lang: Language) -> Iterator[Verdict]:
+    """The axis whose trend stands out most."""
+    one = _worst(axes, lambda axis: abs(axis.drift.value) / (axis.drift.high - axis.drift.low or 1.0))
+    hourly, duration = one.drift.scaled(3600.0), one.timing.duration
+    if one.drifts:
+        change = abs(one.drift.value) * duration
+        sigmas = change / max(one.noise.sigma.value, 1e-300)
+        large = sigmas > LARGE
+        key = "drift_seen" if large else "drift_small"
+        meaning, action = (
+            say(lang, key, change=change, unit=one.unit, sigmas=sigmas),
+            say(lang, "drift_seen_do"),
+        )
+    else:
+        bound, large, action = 0.5 * (hourly.high - hourly.low), False, ""
+        meaning = say(lang, "drift_unseen", duration=duration, bound=bound, unit=one.unit)
+    status: Status = "WARN" if large else "INFO" if one.drifts else "PASS"
+    yield _line_of(say(lang, "drift", axis=one.name), hourly, status, meaning, action, unit=f"{one.unit}/h")
+
+
+def _heat(axes: Axes, lang: Language) -> Iterator[Verdict]:
+    """The axis that depends on temperature most clearly."""
+    if np.isnan(axes[0].warmed):
+        return
+    known = [one for one in axes if one.per_degree is not None]
+    if not known:
+        meaning = say(lang, "heat_none", warmed=axes[0].warmed)
+        yield Verdict(say(lang, "heat", axis=axes[0].name), None, None, "INFO", meaning)
+        return
+    one = _worst(known, lambda axis: _clear(axis.per_degree))
+    slope = one.per_degree
+    assert slope is not None  # noqa: S101 - chosen among those that have one
+    seen = _clear(slope) > 0.5
+    meaning = say(lang, "heat_seen" if seen else "heat_unseen", warmed=one.warmed)
+    action = say(lang, "heat_do") if seen else ""
+    status: Status = "WARN" if seen else "PASS"
+    yield _line_of(say(lang, "heat", axis=one.name), slope, status, meaning, action, f"{one.unit}/°C")
+
+
+def _clear(slope: Estimate | None) -> float:
+    """Size of a slope over the width of its interval; above a half, the interval leaves zero out."""
+    return 0.0 if slope is None else abs(slope.value) / max(slope.high - slope.low, 1e-300)
+
+
+def _resolution(axes: Axes, lang: Language) -> Iterator[Verdict]:
+    """The axis whose noise covers the fewest steps."""
+    gridded = [one for one in axes if one.resolution.lsb > 0.0]
+    if not gridded:
+        yield Verdict(say(lang, "lsb", axis=axes[0].name), None, None, "INFO", say(lang, "lsb_none"))
+        return
+    one = min(gridded, key=lambda axis: axis.noise.sigma.value / axis.resolution.lsb)
+    lsb, sigma, gain = one.resolution.lsb, one.noise.sigma.value, one.oversampling
+    metric = say(lang, "lsb", axis=one.name)
+    if sigma < 0.5 * lsb:
+        meaning = say(lang, "lsb_coarse", sigma=sigma, unit=one.unit)
+        yield Verdict(metric, lsb, None, "WARN", meaning, say(lang, "lsb_coarse_do"), one.unit)
+        return
+    k = min(3, len(gain.factor) - 1)
+    meaning = say(
+        lang,
+        "lsb_noisy",
+        steps=sigma / lsb,
+        effective=one.resolution.effective_bits,
+        bits=one.resolution.bits,
+        factor=int(gain.factor[k]),
+        gained=float(gain.bits[k]),
+        expected=float(gain.expected[k]),
+    )
+    yield Verdict(metric, lsb, None, "PASS", meaning, "", one.unit)
+
+
+def _normal(axes: Axes, lang: Language) -> Iterator[Verdict]:
+    """The axis farthest from a normal distribution."""
+    one = _worst(axes, lambda axis: axis.distribution.distance)
+    seen, n = one.distribution, one.noise.n
+    near = seen.nearly_normal
+    doubtful = seen.p < 0.05
+    which = ("p_small" if doubtful else "p_large") if near else ("p_sure" if doubtful else "p_unsure")
+    p = "p < 10⁻¹⁰" if seen.p < 1e-10 else f"p = {number(seen.p, lang, 2)}"
+    meaning = say(
+        lang,
+        "normal_fits" if near else "normal_off",
+        percent=100.0 * seen.distance,
+        kurtosis=seen.kurtosis.value,
+        skewness=seen.skewness.value,
+        test=say(lang, which, p=p, n=n),
+    )
+    status: Status = "PASS" if near else "WARN"
+    yield Verdict(
+        say(lang, "normal", axis=one.name), seen.distance, None, status, meaning,
+        "" if near else say(lang, "normal_do"),
+    )  # fmt: skip
+
+
+def _outliers(axes: Axes, group: str, lang: Language) -> Verdict:
+    one = _worst(axes, lambda axis: axis.outliers.count)
+    seen, metric = one.outliers, say(lang, "outliers", group=group_name(group, lang))
+    share = seen.share.low, seen.share.high
+    if not seen.count:
+        meaning = say(lang, "outliers_none", n=one.noise.n, one_in=round(1.0 / seen.share.high))
+        return Verdict(metric, 0.0, share, "PASS", meaning)
+    meaning = say(
+        lang,
+        "outliers_some",
+        axis=one.name,
+        count=seen.count,
+        n=one.noise.n + seen.count,
+        hour=seen.per_hour,
+        size=seen.typical,
+        unit=one.unit,
+        sigmas=seen.typical_sigmas,
+        largest=seen.largest,
+    )
+    status: Status = "WARN" if seen.share.low > 1e-4 else "INFO"
+    return Verdict(metric, seen.share.value, share, status, meaning, say(lang, "outliers_do"))
+
+
+def _timing(axes: Axes, group: str, lang: Language) -> Verdict:
+    seen, metric = axes[0].timing, say(lang, "timing", group=group_name(group, lang))
+    if seen.computed:
+        return Verdict(metric, None, None, "INFO", say(lang, "timing_even", rate=seen.rate))
+    share = seen.jitter * seen.rate
+    told = say(lang, "timing_means", rate=seen.rate, percent=100.0 * share, worst=1e3 * seen.worst)
+    bad = share > LATE or len(seen.gaps) > 0
+    if len(seen.gaps):
+        at, longest = seen.gaps[np.argmax(seen.gaps[:, 1])]
+        told += say(
+            lang,
+            "timing_gaps",
+            count=len(seen.gaps),
+            missing=seen.missing,
+            longest=float(longest),
+            at=float(at),
+        )
+    action = say(lang, "timing_do") if bad else ""
+    return Verdict(metric, 1e3 * seen.jitter, None, "WARN" if bad else "PASS", told, action, "ms")
+
+
+def _line(axes: Axes, lang: Language) -> Iterator[Verdict]:
+    """The strongest line of any axis."""
+    humming = [one for one in axes if one.spectrum.lines]
+    loud = [(one.spectrum.lines[0][1] / max(one.noise.sigma.value, 1e-300), one) for one in humming]
+    if not loud:
+        return
+    share, one = max(loud, key=lambda pair: pair[0])
+    hz, sigma = one.spectrum.lines[0]
+    meaning = say(lang, "line_means", hz=hz, sigma=sigma, unit=one.unit, percent=100.0 * share**2)
+    status: Status = "WARN" if share**2 > LOUD else "INFO"
+    yield Verdict(say(lang, "line", axis=one.name), hz, None, status, meaning, say(lang, "line_do"), "Hz")
