@@ -9,9 +9,11 @@ from factorlab.characterize.words import say
 from factorlab.report.document import Status, Verdict
 from factorlab.report.words import Language
 
-__all__ = ["against_declared"]
+__all__ = ["against_declared", "judged_density"]
 
 NEAR = 1.5  # a ratio of variances up to which R is right enough
+DENSITY_NEAR = 1.5
+DENSITY_FAR = 4.0
 FAR = 4.0  # too small by more than this misleads a filter
 
 
@@ -52,3 +54,24 @@ def _round(times: float, lang: Language) -> str:
     """A factor as people say it: 8.2, 15, 230."""
     text = f"{times:.2g}" if times < 10.0 else f"{times:.0f}"
     return text.replace(".", ",") if lang == "fr" else text
+
+
+def judged_density(
+    declared: float, measured: float, unit: str, lang: Language, *, bound: bool
+) -> tuple[tuple[str, str], Status]:
+    """Words and status for a declared density; `bound`: the measured one is an upper bound.
+
+    A bias walk is known within a factor of a few only, and most filters want it larger than the sensor's own.
+    """
+    numbers: dict[str, float | str] = {"declared": declared, "measured": measured, "unit": unit}
+    if bound:
+        key = "density_above_bound" if declared > measured else "density_below_bound"
+        return (say(lang, key, **numbers), ""), "INFO"
+    ratio = measured / declared if declared > 0.0 else float("inf")
+    remedy = say(lang, "density_do", measured=measured, unit=unit)
+    if ratio > DENSITY_NEAR:
+        words = say(lang, "density_small", x=_round(ratio, lang), **numbers)
+        return (words, remedy), "FAIL" if ratio > DENSITY_FAR else "WARN"
+    if ratio < 1.0 / DENSITY_FAR:
+        return (say(lang, "density_large", x=_round(1.0 / ratio, lang), **numbers), ""), "INFO"
+    return (say(lang, "density_fits", **numbers), ""), "PASS"

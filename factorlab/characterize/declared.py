@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 from factorlab.characterize.channels import Channel
-from sequential.errors import DataError, FactorlabError, FileFormatError
+from sequential.errors import DataError
 from sequential.noise import ImuNoise
-from sequential.readers.files import read_text
 
 __all__ = ["Declared", "read_noise"]
 
@@ -69,26 +67,12 @@ class Declared:
 
 
 def read_noise(path: Path) -> ImuNoise:
-    """Noise densities from Kalibr's `imu.yaml`, or from a mapping with the names of `ImuNoise`.
+    """Noise densities from Kalibr's `imu.yaml`.
 
     Raises
     ------
     DataError, FileFormatError
     """
-    import yaml
+    from sequential.readers import read_kalibr_imu
 
-    try:
-        found: Any = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as fault:
-        raise FileFormatError(f"{path} is not YAML: {fault}") from None
-    if isinstance(found, dict) and len(found) == 1 and isinstance(next(iter(found.values())), dict):
-        found = next(iter(found.values()))  # `imu0:` above the numbers
-    if not isinstance(found, dict):
-        raise FileFormatError(f"{path} must map names to numbers, such as gyroscope_noise_density: 1.6e-4")
-    try:
-        if "gyro_density" in found:
-            names = ImuNoise.__slots__
-            return ImuNoise(**{name: float(found[name]) for name in names if name in found})
-        return ImuNoise.from_kalibr(found)
-    except (FactorlabError, TypeError, ValueError) as fault:
-        raise FileFormatError(f"{path}: {fault}") from None
+    return read_kalibr_imu(path).noise

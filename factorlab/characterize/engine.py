@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from factorlab.characterize.channels import Channel
 from factorlab.characterize.declared import Declared
+from factorlab.characterize.slow import SlowNoise, slow_noise
 from sequential.errors import DataError
 from sequential.sensors import (
     Characteristics,
@@ -40,6 +41,7 @@ class Study:
     duration : s, of the whole recording
     declared : noise to compare with
     findings : what readers and checks noticed
+    slow : Allan deviations and the coefficients N, B and K
     step_at : s after the first stamp, when the input stepped, where that is known
     """
 
@@ -51,6 +53,7 @@ class Study:
     duration: float
     declared: Declared
     findings: tuple[Finding, ...]
+    slow: SlowNoise
     step_at: float | None = None
 
     def groups(self) -> dict[str, list[int]]:
@@ -108,7 +111,19 @@ def study(
                 )
             )
     duration = float(last - first) * 1e-9
-    return Study(name, chosen, tuple(axes), tuple(steps), window, duration, declared, findings, step_at)
+    slow = SlowNoise() if step else slow_noise(name, chosen)
+    return Study(
+        name,
+        chosen,
+        tuple(axes),
+        tuple(steps),
+        window,
+        duration,
+        declared,
+        (*findings, *slow.findings),
+        slow,
+        step_at,
+    )
 
 
 def still_part(recording: ImuRecording) -> Window | None:
@@ -119,18 +134,21 @@ def still_part(recording: ImuRecording) -> Window | None:
     DataError
         where nothing is still.
     """
-    if recording.accel is None and recording.gyro is None:
-        return None
-    dwells = StillDetector().find(recording)
+    seen = recording
+    if recording.accel is None and recording.gyro is None:  # the detector looks at the variance of any three
+        known = np.isfinite(recording.mag).all(axis=1)  # type: ignore[arg-type]
+        seen = ImuRecording(recording.t[known], gyro=recording.mag[known], name=recording.name)  # type: ignore[index]
+    dwells = StillDetector().find(seen)
     if not dwells:
         raise DataError(
             f"recording {recording.name!r} is never still for a second; noise, bias and Allan deviation need "
             "a sensor at rest: put it down, or name the part with --still START:STOP (s)"
         )
     rows = max(dwells, key=len)
-    if len(rows) >= WHOLE * len(recording):
+    if len(rows) >= WHOLE * len(seen):
         return None
-    return float(recording.seconds[rows[0]]), float(recording.seconds[rows[-1]])
+    since = (seen.t[rows] - recording.t[0]) * 1e-9
+    return float(since[0]), float(since[-1])
 
 
 def _cut(channel: Channel, first: int, window: Window) -> Channel:

@@ -7,13 +7,15 @@ from typing import Any
 
 from factorlab.characterize.comparing import against_declared
 from factorlab.characterize.engine import Study
+from factorlab.characterize.slow_verdicts import of_densities, of_slow_noise
 from factorlab.characterize.stepping import of_steps
 from factorlab.characterize.tables import sections_at_rest, sections_of_steps
 from factorlab.characterize.verdicts import at_rest
 from factorlab.characterize.words import say
 from factorlab.report.document import Document, Status, Verdict
 from factorlab.report.words import Language
-from sequential.sensors import Finding
+from sequential.sensors import Coefficient, Finding
+from sequential.sensors.noise_fit import TERMS
 
 __all__ = ["document_of"]
 
@@ -23,7 +25,7 @@ ORDER = {"FAIL": 0, "WARN": 1, "PASS": 2, "INFO": 3}
 
 def document_of(study: Study, *, lang: Language = "en", command: str = "") -> Document:
     """Everything that a study has to say, worst verdicts first."""
-    told = of_steps(study, lang) if study.steps else (*against_declared(study, lang), *at_rest(study, lang))
+    told = of_steps(study, lang) if study.steps else _told(study, lang)
     verdicts = [*_findings(study.findings, lang), *told]
     sections = sections_of_steps(study, lang) if study.steps else sections_at_rest(study, lang)
     return Document(
@@ -35,6 +37,13 @@ def document_of(study: Study, *, lang: Language = "en", command: str = "") -> Do
         lang=lang,
         command=command,
     )
+
+
+def _told(study: Study, lang: Language) -> Iterator[Verdict]:
+    yield from against_declared(study, lang)
+    yield from of_densities(study, lang)
+    yield from at_rest(study, lang)
+    yield from of_slow_noise(study, lang)
 
 
 def _lead(study: Study, lang: Language) -> str:
@@ -54,6 +63,10 @@ def _findings(findings: tuple[Finding, ...], lang: Language) -> Iterator[Verdict
         yield Verdict(
             say(lang, "recording"), None, None, SEVERITY[one.severity], f"{one.what}{where}", one.do
         )
+
+
+def _coefficient(one: Coefficient) -> dict[str, Any]:
+    return {key: getattr(one, key) for key in ("value", "low", "high", "visible")}
 
 
 def _numbers(study: Study) -> dict[str, Any]:
@@ -81,4 +94,15 @@ def _numbers(study: Study) -> dict[str, Any]:
         "repeated": timing.repeated,
         "computed": timing.computed,
     }
-    return plain | {"axes": {one.name: one.to_json() for one in study.axes}}
+    slow = study.slow
+    plain["imu_noise"] = (
+        None if slow.noise is None else {n: getattr(slow.noise, n) for n in slow.noise.__slots__}
+    )
+    plain["upper_bounds"] = list(slow.bounds)
+    axes = {one.name: one.to_json() for one in study.axes}
+    for name, fit in slow.fits.items():
+        axes[name]["allan"] = {
+            term: {key: getattr(fit[term], key) for key in ("value", "low", "high", "visible")}
+            for term in TERMS
+        }
+    return plain | {"axes": axes}

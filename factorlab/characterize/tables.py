@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from factorlab.characterize.engine import Study
 from factorlab.characterize.words import say
 from factorlab.report.document import Cell, Section, Table
-from factorlab.report.words import Language, interval
+from factorlab.report.words import Language, interval, number
 from sequential.sensors import Characteristics, Estimate
+from sequential.sensors.noise_fit import Term
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +30,7 @@ def sections_at_rest(study: Study, lang: Language) -> Iterator[Section]:
         ("drift", _levels(lang), "drift"),
         ("resolution", RESOLUTION, "oversampling"),
         ("spectrum", (), "spectra"),
+        ("allan", _terms(study, lang), ""),
         ("timing", TIMING, ""),
     ):
         yield Section(
@@ -64,6 +66,31 @@ def _table(study: Study, lang: Language, columns: tuple[Column, ...], name: str 
     if name == "resolution":
         heads += [say(lang, "h_gain", factor=factor) for factor in FACTORS]
     return Table(tuple(heads), rows)
+
+
+def _terms(study: Study, lang: Language) -> tuple[Column, ...]:
+    """N, B and K of each axis, an upper bound where one is not visible."""
+
+    def cell(term: Term) -> Callable[[Characteristics], Cell]:
+        def written(one: Characteristics) -> Cell:
+            fit = study.slow.fits.get(one.name)
+            if fit is None:
+                return None
+            return fit[term].value if fit[term].visible else f"< {number(fit[term].high, lang, 2)}"
+
+        return written
+
+    def ends(term: Term) -> Callable[[Characteristics], Cell]:
+        def written(one: Characteristics) -> Cell:
+            fit = study.slow.fits.get(one.name)
+            seen = fit is not None and fit[term].visible
+            return interval((fit[term].low, fit[term].high) if fit is not None and seen else None, lang)
+
+        return written
+
+    terms: tuple[Term, ...] = ("N", "B", "K")
+    pairs = [((f"term_{term.lower()}", cell(term)), ("interval", ends(term))) for term in terms]
+    return tuple(column for pair in pairs for column in pair)
 
 
 def _gains(one: Characteristics) -> tuple[Cell, ...]:

@@ -16,6 +16,7 @@ __all__ = ["at_rest"]
 
 Axes = list[Characteristics]
 STANDARD_GRAVITY = 9.80665
+MOVING = 5.0  # σ over that of neighbours
 TURN = np.radians(0.05)  # rad/s of gyro bias below which nobody minds
 OFF_GRAVITY = 0.01
 LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
@@ -32,6 +33,7 @@ def at_rest(study: Study, lang: Language) -> Iterator[Verdict]:
             yield from (_stuck(one, lang) for one in stuck)
             axes = [one for one in axes if not one.stuck]
         if axes:
+            yield from _moving(axes, lang)
             yield _sigma(axes, group, lang)
             yield from _level(axes, group, lang)
             for about in (_drift, _heat, _resolution, _normal):
@@ -48,6 +50,15 @@ def _worst(axes: Axes, by: Callable[[Characteristics], float]) -> Characteristic
 def _stuck(one: Characteristics, lang: Language) -> Verdict:
     words = say(lang, "stuck"), say(lang, "stuck_do")
     return Verdict(say(lang, "sigma", axis=one.name), 0.0, None, "FAIL", *words, unit=one.unit)
+
+
+def _moving(axes: Axes, lang: Language) -> Iterator[Verdict]:
+    """Readings that go much farther than they differ from one to the next are no noise."""
+    one = _worst(axes, lambda axis: axis.noise.sigma.value / max(axis.noise.step_sigma, 1e-300))
+    times = one.noise.sigma.value / max(one.noise.step_sigma, 1e-300)
+    if times > MOVING and one.noise.step_sigma > 0.0:
+        words = say(lang, "moving_means", x=times), say(lang, "moving_do")
+        yield Verdict(say(lang, "moving", axis=one.name), times, None, "WARN", *words)
 
 
 def _sigma(axes: Axes, group: str, lang: Language) -> Verdict:
@@ -199,10 +210,10 @@ def _normal(axes: Axes, lang: Language) -> Iterator[Verdict]:
         test=say(lang, which, p=p, n=n),
     )
     status: Status = "PASS" if near else "WARN"
-    yield Verdict(
-        say(lang, "normal", axis=one.name), seen.distance, None, status, meaning,
-        "" if near else say(lang, "normal_do"),
-    )  # fmt: skip
+    metric, action = say(lang, "normal", axis=one.name), "" if near else say(lang, "normal_do")
+    if not near and seen.uneven_steps:
+        meaning, status, action = say(lang, "normal_teeth", percent=100.0 * seen.distance), "INFO", ""
+    yield Verdict(metric, seen.distance, None, status, meaning, action)
 
 
 def _outliers(axes: Axes, group: str, lang: Language) -> Verdict:

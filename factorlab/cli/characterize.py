@@ -99,6 +99,7 @@ def characterize(**options: Any) -> int:
 
 def characterize_and_show(settings: Settings) -> int:
     """Study, print, write; returns the exit code."""
+    from factorlab.characterize.exports import kalibr_file
     from factorlab.characterize.page import document_of
     from factorlab.cli.delivery import deliver
     from factorlab.report.folder import require_free
@@ -113,6 +114,7 @@ def characterize_and_show(settings: Settings) -> int:
         out=settings.out,
         force=settings.force,
         check=settings.check,
+        files=kalibr_file(found, lang),
     )
     return code or (DATA_ERROR if any(one.severity == "fail" for one in found.findings) else 0)
 
@@ -131,9 +133,10 @@ def _study(settings: Settings) -> Study:
         name = settings.log.stem
     else:
         from sequential.readers import read_imu
+        from sequential.sensors.health import inspect
 
         recording = read_imu(settings.log, kind=settings.kind, units=settings.units, rate=settings.rate)
-        channels, findings, name = channels_of(recording), recording.findings, recording.name
+        channels, findings, name = channels_of(recording), inspect(recording), recording.name
         if window is None and not settings.step:
             window = still_part(recording)
     with bar(name, shown=sys.stderr.isatty()) as progress:

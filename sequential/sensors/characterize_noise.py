@@ -100,7 +100,16 @@ class Distribution:
     @property
     def nearly_normal(self) -> bool:
         """Whether a filter may take the noise for normal, however sure a test is that it is not quite."""
-        return self.distance < 0.03 and abs(self.skewness.value) < 0.3 and abs(self.kurtosis.value) < 1.0
+        return self.distance < 0.03 and self._normal_shape
+
+    @property
+    def uneven_steps(self) -> bool:
+        """Whether shape and tails are normal but the distance is not: some codes come more often."""
+        return self.distance >= 0.03 and self._normal_shape
+
+    @property
+    def _normal_shape(self) -> bool:
+        return abs(self.skewness.value) < 0.3 and abs(self.kurtosis.value) < 1.0
 
 
 def distribution_of(residual: Array, noise: Noise, lsb: float = 0.0, bins: int = 60) -> Distribution:

@@ -1,0 +1,119 @@
+"""The slow part of the noise: Allan deviations and the coefficients N, B and K of every channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factorlab.characterize.channels import AXES, Channel
+from sequential.errors import FactorlabError
+from sequential.noise import ImuNoise
+from sequential.sensors import (
+    AllanDeviation,
+    Finding,
+    ImuNoiseReport,
+    ImuRecording,
+    NoiseFit,
+    allan_deviation,
+    fit_noise,
+    imu_noise,
+)
+
+__all__ = ["SlowNoise", "slow_noise"]
+
+PAUSE = 5.5  # intervals, as in `sequential.sensors.imu_noise`
+FEWEST = 64
+INERTIAL = {"accel": "m/s²", "gyro": "rad/s"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlowNoise:
+    """Allan deviations and coefficients.
+
+    Parameters
+    ----------
+    deviations : overlapping Allan deviation of a group, (T, k), where it could be had
+    fits : by channel, where they could be had
+    noise : of an IMU in SI units, as a filter takes it
+    bounds : fields of `noise` that are upper bounds, since the recording is too short to see them
+    rate : Hz
+    findings : why something could not be had
+    """
+
+    deviations: Mapping[str, AllanDeviation] = field(default_factory=dict)
+    fits: Mapping[str, NoiseFit] = field(default_factory=dict)
+    noise: ImuNoise | None = None
+    bounds: tuple[str, ...] = ()
+    rate: float = float("nan")
+    findings: tuple[Finding, ...] = ()
+
+
+def slow_noise(name: str, channels: tuple[Channel, ...]) -> SlowNoise:
+    """Allan deviations of all channels; an IMU's accelerometer and gyro are read together."""
+    groups: dict[str, list[Channel]] = {}
+    for channel in channels:
+        groups.setdefault(channel.group, []).append(channel)
+    deviations: dict[str, AllanDeviation] = {}
+    fits: dict[str, NoiseFit] = {}
+    said: list[Finding] = []
+    report = _of_imu(name, groups, said)
+    if report is not None:
+        for group, three in report.fits.items():
+            fits |= dict(zip(AXES[group], three, strict=True))
+            deviations[group] = report.deviations[group]
+        said += [Finding("warn", note.rstrip(".")) for note in report.notes]
+    for group, own in groups.items():
+        if group in deviations:
+            continue
+        try:
+            deviations[group] = _of_group(own, fits)
+        except FactorlabError as fault:
+            said.append(Finding("warn", f"no Allan deviation of {group}: {_plain(fault)}"))
+    if report is None:
+        return SlowNoise(deviations, fits, findings=tuple(said))
+    return SlowNoise(deviations, fits, report.noise, report.bounds, report.rate, tuple(said))
+
+
+def _of_imu(name: str, groups: Mapping[str, list[Channel]], said: list[Finding]) -> ImuNoiseReport | None:
+    """Accelerometer and gyro in SI units through `imu_noise`; None where there is none, or it refuses."""
+    own: dict[str, Any] = {
+        group: np.column_stack([channel.values for channel in groups[group]])
+        for group, unit in INERTIAL.items()
+        if group in groups and len(groups[group]) == 3 and groups[group][0].unit == unit
+    }
+    if not own:
+        return None
+    try:
+        return imu_noise(ImuRecording(groups[next(iter(own))][0].t, name=name, **own))
+    except FactorlabError as fault:
+        said.append(Finding("warn", f"no Allan deviation of the whole IMU: {_plain(fault)}"))
+        return None
+
+
+def _of_group(channels: list[Channel], fits: dict[str, NoiseFit]) -> AllanDeviation:
+    """Deviation of channels with common stamps, over the longest stretch without a pause; adds fits."""
+    t = channels[0].t
+    rows = _even_rows(t)
+    rate = float((len(t[rows]) - 1) / ((t[rows][-1] - t[rows][0]) * 1e-9))
+    values = np.column_stack([channel.values[rows] for channel in channels])
+    found = allan_deviation(values, rate)
+    for channel in channels:
+        if np.ptp(channel.values[rows]) > 0.0 and len(channel.values[rows]) >= FEWEST:
+            fits[channel.name] = fit_noise(channel.values[rows], rate, unit=channel.unit)
+    return found
+
+
+def _even_rows(t: NDArray[np.int64]) -> slice:
+    steps = np.diff(t)
+    pauses = np.flatnonzero(steps > PAUSE * np.median(steps))
+    starts, stops = np.append(0, pauses + 1), np.append(pauses + 1, len(t))
+    longest = int(np.argmax(stops - starts))
+    return slice(int(starts[longest]), int(stops[longest]))
+
+
+def _plain(fault: FactorlabError) -> str:
+    return " ".join(str(fault).split())
