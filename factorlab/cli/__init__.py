@@ -5,6 +5,7 @@ Exit codes: 0 ok, 1 the data are at fault, 2 the command line is, 3 (only with -
 
 import click
 
+from factorlab.cli.attitude import attitude
 from factorlab.cli.calibrate import calibrate
 from factorlab.cli.characterize import characterize
 from factorlab.cli.compare import compare
@@ -41,5 +42,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, characterize, calibrate, info, doctor):
+for command in (demo, compare, tune, characterize, calibrate, attitude, info, doctor):
     main.add_command(command)
