@@ -1,0 +1,94 @@
+"""Orientation change between dwells from raw gyro readings, with its derivative by the gyro's constants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.manifold.quaternion import quaternion_exp, quaternion_multiply, rotation_matrix
+from sequential.manifold.so3 import right_jacobian
+from sequential.sensors.recording import ImuRecording
+
+__all__ = ["GyroIntervals", "Turned", "intervals_between", "turned"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GyroIntervals:
+    """Readings of S intervals, padded to the longest one with steps of no length.
+
+    `raw` (S, L, 3) is the mean of the two readings around each step, `dt` (S, L) its length in s;
+    `whole` (S,) is False where a reading is at the end of the gyro's range.
+    """
+
+    raw: Array
+    dt: Array
+    whole: NDArray[np.bool_]
+
+    @property
+    def seconds(self) -> Array:
+        """(S,) length of each interval."""
+        return np.asarray(self.dt.sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Turned:
+    """Rotation over each interval, R takes vectors of its end frame to its start frame.
+
+    A small change of the constants turns the end frame by `by_matrix` (S, 3, 9) times the change of the
+    matrix, row by row, and `by_offset` (S, 3, 3) times that of the offset (right, in the end frame).
+    """
+
+    quaternion: Array  # (S, 4)
+    rotation: Array  # (S, 3, 3)
+    by_matrix: Array
+    by_offset: Array
+
+
+def intervals_between(recording: ImuRecording, start: NDArray[np.int64], stop: NDArray[np.int64]) -> GyroIntervals:
+    """Readings from row start[k] to row stop[k], both included; `start`, `stop` (S,)."""
+    gyro = recording.require("gyro", si=False).gyro
+    assert gyro is not None  # noqa: S101 - require() has looked
+    longest = int((stop - start).max())
+    raw, dt = np.zeros((len(start), longest, 3)), np.zeros((len(start), longest))
+    steps, clipped = recording.dt, saturated(gyro)
+    for k, (a, b) in enumerate(zip(start.tolist(), stop.tolist(), strict=True)):
+        raw[k, : b - a] = (gyro[a:b] + gyro[a + 1 : b + 1]) / 2
+        dt[k, : b - a] = steps[a:b]
+    whole = np.array([not clipped[a : b + 1].any() for a, b in zip(start, stop, strict=True)])
+    return GyroIntervals(raw, dt, whole)
+
+
+def saturated(values: Array) -> NDArray[np.bool_]:
+    """Rows (N,) with a reading at an end of its axis' range that is reached for two samples running."""
+    found = np.zeros(len(values), dtype=bool)
+    for end in (values.max(axis=0), values.min(axis=0)):
+        at = np.abs(values - end) <= 1e-4 * np.ptp(values, axis=0)
+        running = (at[1:] & at[:-1]).any(axis=0)
+        found |= (at & running).any(axis=1)
+    return found
+
+
+def turned(matrix: Array, offset: Array, intervals: GyroIntervals) -> Turned:
+    """Integrate matrix @ (raw - offset) over every interval: a product of exponentials of the steps."""
+    centred = intervals.raw - offset
+    phi = centred @ matrix.T * intervals.dt[..., None]
+    q = _running_product(quaternion_exp(phi))
+    rotations = rotation_matrix(q)
+    last = rotations[:, -1]
+    # what a small turn at step i, right, is worth at the end: (later steps)ᵀ J_r
+    weight = np.einsum("sji,sljk->slik", last, rotations) @ right_jacobian(phi) * intervals.dt[..., None, None]
+    by_matrix = np.einsum("slka,slb->skab", weight, centred).reshape(len(phi), 3, 9)
+    return Turned(q[:, -1], last, by_matrix, -weight.sum(axis=1) @ matrix)
+
+
+def _running_product(q: Array) -> Array:
+    """q0, q0 q1, q0 q1 q2 … along the second axis, in log2(L) passes (Hillis and Steele)."""
+    shift = 1
+    while shift < q.shape[1]:
+        q = np.concatenate([q[:, :shift], quaternion_multiply(q[:, :-shift], q[:, shift:])], axis=1)
+        shift *= 2
+    return q
