@@ -87,16 +87,21 @@ def find_dwells(recording: ImuRecording, detector: StillDetector | None = None) 
 def _averages(parts: list[Array], length: int) -> tuple[Array, Array]:
     """Means (K, 3) and their covariances (K, 3, 3).
 
-    Samples of one sensor are correlated by its filter and by drift, by the same factor in every dwell: the
-    variance of block means over what independent samples would give, as the median over the dwells.
+    Samples of one sensor are correlated by its filter and by drift: the variance of block means over what
+    independent samples would give says by how much.  Its median over the dwells holds for all; a dwell whose
+    own blocks scatter more, as in a hand that trembles, gets its own.
     """
-    white, ratio = [], []
-    for part in parts:
-        cov = np.cov(part.T) / len(part)
-        white.append(cov)
-        count = len(part) // length
-        if count >= 4 and (trace := np.trace(cov)) > 0:
-            blocks = part[: count * length].reshape(count, length, 3).mean(axis=1)
-            ratio.append(np.trace(np.cov(blocks.T)) / count / trace)
-    factor = max(1.0, float(np.median(ratio))) if ratio else 1.0
-    return np.array([part.mean(axis=0) for part in parts]), factor * np.array(white)
+    white = [np.cov(part.T) / len(part) for part in parts]
+    ratio = np.array([_correlation(part, length) for part in parts])
+    usual = max(1.0, float(np.median(ratio)))
+    factors = np.where(ratio > 2 * usual, ratio, usual)  # a dozen blocks alone would be a poor estimate
+    return np.array([part.mean(axis=0) for part in parts]), factors[:, None, None] * np.array(white)
+
+
+def _correlation(part: Array, length: int) -> float:
+    """Variance of block means over that of independent samples; 1 where there are few blocks."""
+    count, total = len(part) // length, float(np.var(part, axis=0, ddof=1).sum())
+    if count < 4 or total <= 0:
+        return 1.0
+    blocks = part[: count * length].reshape(count, length, 3).mean(axis=1)
+    return float(np.var(blocks, axis=0, ddof=1).sum()) * length / total

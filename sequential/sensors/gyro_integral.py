@@ -11,9 +11,10 @@ from sequential.manifold.quaternion import quaternion_exp, quaternion_multiply, 
 from sequential.manifold.so3 import right_jacobian
 from sequential.sensors.recording import ImuRecording
 
-__all__ = ["GyroIntervals", "Turned", "intervals_between", "turned"]
+__all__ = ["GyroIntervals", "Turned", "intervals_between", "rotations", "saturated", "turned"]
 
 Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +27,7 @@ class GyroIntervals:
 
     raw: Array
     dt: Array
-    whole: NDArray[np.bool_]
+    clipped: Stamps
 
     @property
     def seconds(self) -> Array:
@@ -48,7 +49,7 @@ class Turned:
     by_offset: Array
 
 
-def intervals_between(recording: ImuRecording, start: NDArray[np.int64], stop: NDArray[np.int64]) -> GyroIntervals:
+def intervals_between(recording: ImuRecording, start: Stamps, stop: Stamps) -> GyroIntervals:
     """Readings from row start[k] to row stop[k], both included; `start`, `stop` (S,)."""
     gyro = recording.require("gyro", si=False).gyro
     assert gyro is not None  # noqa: S101 - require() has looked
@@ -58,8 +59,8 @@ def intervals_between(recording: ImuRecording, start: NDArray[np.int64], stop: N
     for k, (a, b) in enumerate(zip(start.tolist(), stop.tolist(), strict=True)):
         raw[k, : b - a] = (gyro[a:b] + gyro[a + 1 : b + 1]) / 2
         dt[k, : b - a] = steps[a:b]
-    whole = np.array([not clipped[a : b + 1].any() for a, b in zip(start, stop, strict=True)])
-    return GyroIntervals(raw, dt, whole)
+    count = [int(clipped[a : b + 1].sum()) for a, b in zip(start, stop, strict=True)]
+    return GyroIntervals(raw, dt, np.array(count))
 
 
 def saturated(values: Array) -> NDArray[np.bool_]:
@@ -77,12 +78,18 @@ def turned(matrix: Array, offset: Array, intervals: GyroIntervals) -> Turned:
     centred = intervals.raw - offset
     phi = centred @ matrix.T * intervals.dt[..., None]
     q = _running_product(quaternion_exp(phi))
-    rotations = rotation_matrix(q)
-    last = rotations[:, -1]
+    passed = rotation_matrix(q)
+    last = passed[:, -1]
     # what a small turn at step i, right, is worth at the end: (later steps)ᵀ J_r
-    weight = np.einsum("sji,sljk->slik", last, rotations) @ right_jacobian(phi) * intervals.dt[..., None, None]
+    weight = last.transpose(0, 2, 1)[:, None] @ passed @ right_jacobian(phi) * intervals.dt[..., None, None]
     by_matrix = np.einsum("slka,slb->skab", weight, centred).reshape(len(phi), 3, 9)
     return Turned(q[:, -1], last, by_matrix, -weight.sum(axis=1) @ matrix)
+
+
+def rotations(matrix: Array, offset: Array, intervals: GyroIntervals) -> Array:
+    """Rotation (S, L, 3, 3) from each step's end back to the interval's start, without derivatives."""
+    phi = (intervals.raw - offset) @ matrix.T * intervals.dt[..., None]
+    return rotation_matrix(_running_product(quaternion_exp(phi)))
 
 
 def _running_product(q: Array) -> Array:

@@ -14,7 +14,6 @@ from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY
 from sequential.sensors.gravity_fit import (
     NAMES,
-    GravityFit,
     Prior,
     fit_norm,
     foreseen,
@@ -24,6 +23,7 @@ from sequential.sensors.gravity_fit import (
     robust_inliers,
 )
 from sequential.sensors.positions import missing_positions
+from sequential.sensors.prior_fit import Fitted
 
 __all__ = ["AccelerometerFit", "MultiPosition"]
 
@@ -43,7 +43,7 @@ class AccelerometerFit:
     """
 
     calibration: AffineCalibration
-    fit: GravityFit
+    fit: Fitted
     dwells: Dwells
     gravity: float
     used: Mask
@@ -108,7 +108,7 @@ class MultiPosition:
             self._findings(dwells, fit, used, left_out),
         )
 
-    def _fit(self, dwells: Dwells, used: Mask) -> GravityFit:
+    def _fit(self, dwells: Dwells, used: Mask) -> Fitted:
         assert dwells.accel is not None  # noqa: S101 - calibrate() has looked
         assert dwells.accel_cov is not None  # noqa: S101
         means = dwells.accel[used]
@@ -177,7 +177,7 @@ class MultiPosition:
             f"lie in one plane or on one side; add positions with {_axes(blamed)} pointing up and down"
         )
 
-    def _calibration(self, fit: GravityFit, dwells: Dwells, used: Mask, source: str) -> AffineCalibration:
+    def _calibration(self, fit: Fitted, dwells: Dwells, used: Mask, source: str) -> AffineCalibration:
         J = matrix_jacobian(fit.parameters)
         return AffineCalibration(
             matrix_of(fit.parameters),
@@ -190,7 +190,7 @@ class MultiPosition:
             source or f"{dwells.name}: {int(used.sum())} dwells, g = {self.gravity:.5f} m/s^2",
         )
 
-    def _findings(self, dwells: Dwells, fit: GravityFit, used: Mask, left_out: Array) -> tuple[Finding, ...]:
+    def _findings(self, dwells: Dwells, fit: Fitted, used: Mask, left_out: Array) -> tuple[Finding, ...]:
         found = []
         for k in np.flatnonzero(~used):
             start, stop = dwells.seconds[k]
