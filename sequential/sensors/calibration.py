@@ -152,17 +152,25 @@ class AffineCalibration:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImuCalibration:
-    """Calibrations of the sensors of one IMU, any of them absent; one JSON file."""
+    """Calibrations of the sensors of one IMU, any of them absent; one JSON file.
+
+    `g_sensitivity` (3, 3) is what the gyro reads of the calibrated specific force, in the gyro's raw unit per
+    m/s²; it is taken off before the gyro is calibrated.  None where it is not known, or too small to be seen.
+    """
 
     accel: AffineCalibration | None = None
     gyro: AffineCalibration | None = None
     mag: AffineCalibration | None = None
+    g_sensitivity: Array | None = None
 
     def __post_init__(self) -> None:
         for kind in KINDS:
             one = getattr(self, kind)
             if one is not None and one.kind != kind:
                 raise DataError(f"ImuCalibration.{kind} was given a calibration of kind {one.kind!r}")
+        if self.g_sensitivity is not None:
+            sealed = _sealed(self.g_sensitivity, (3, 3), "ImuCalibration.g_sensitivity")
+            object.__setattr__(self, "g_sensitivity", sealed)
 
     @property
     def present(self) -> tuple[AffineCalibration, ...]:
@@ -171,7 +179,8 @@ class ImuCalibration:
 
     def merged(self, other: ImuCalibration) -> ImuCalibration:
         """A bundle of these, with whatever `other` has taking the place of what is here."""
-        return ImuCalibration(other.accel or self.accel, other.gyro or self.gyro, other.mag or self.mag)
+        felt = other.g_sensitivity if other.gyro is not None else self.g_sensitivity
+        return ImuCalibration(other.accel or self.accel, other.gyro or self.gyro, other.mag or self.mag, felt)
 
     def apply(self, recording: ImuRecording) -> ImuRecording:
         """The recording with every sensor calibrated that has a calibration here.
@@ -192,13 +201,17 @@ class ImuCalibration:
                     f"{one.unit_in}: read it as the calibration's recording was read, or use with_counts()"
                 )
             known = one.unit_out == SI[one.kind]
+            if one.kind == "gyro" and self.g_sensitivity is not None and self.accel and "accel" in changed:
+                raw = raw - changed["accel"] @ self.g_sensitivity.T
             changed |= {one.kind: one.apply(raw), f"{one.kind}_unit": one.unit_out if known else unit}
         return replace(recording, **changed)
 
     def to_json(self) -> str:
         """One JSON object with the version of its schema."""
         head: dict[str, Any] = {"schema": SCHEMA, "version": SCHEMA_VERSION}
-        body = {one.kind: one.to_dict() for one in self.present}
+        body: dict[str, Any] = {one.kind: one.to_dict() for one in self.present}
+        if self.g_sensitivity is not None:
+            body["g_sensitivity"] = self.g_sensitivity.tolist()
         return json.dumps(head | {"equation": "calibrated = matrix @ (raw - offset)"} | body, indent=1,
                           allow_nan=False)  # fmt: skip
 
@@ -219,10 +232,11 @@ class ImuCalibration:
                 f"{where}: schema version {values.get('version')!r}; this program reads {SCHEMA_VERSION}"
             )
         try:
-            return cls(
-                **{kind: AffineCalibration.from_dict(values[kind]) for kind in KINDS if kind in values}
-            )
-        except FileFormatError as error:
+            found = {kind: AffineCalibration.from_dict(values[kind]) for kind in KINDS if kind in values}
+            felt = values.get("g_sensitivity")
+            matrix = None if felt is None else np.asarray(felt, dtype=np.float64)
+            return cls(found.get("accel"), found.get("gyro"), found.get("mag"), matrix)
+        except (FileFormatError, TypeError, ValueError) as error:
             raise FileFormatError(f"{where}: {error}") from error
 
     def save(self, path: str | Path) -> Path:

@@ -71,6 +71,16 @@ def _struct(one: AffineCalibration) -> list[str]:
     ]
 
 
+def _felt(matrix: Array, unit: str) -> list[str]:
+    rows = ",\n".join(f"    {{{', '.join(_float(value) for value in row)}}}" for row in matrix)
+    return [
+        "/* What the gyro reads of gravity: first take off gyro_g_sensitivity * calibrated accelerometer. */",
+        f"/* {_commentable(unit)} per m/s^2 */",
+        f"static const float gyro_g_sensitivity[3][3] = {{\n{rows}}};",
+        "",
+    ]
+
+
 def _float(value: float) -> str:
     """Nine digits carry a float there and back."""
     if abs(value) > np.finfo(np.float32).max:
@@ -117,8 +127,9 @@ def kalibr_yaml(calibration: ImuCalibration, *, rate: float | None = None) -> st
         lines += [*_rows("    M", lower), f"    offset: {_numbers(accel.offset)}  # {accel.unit_in}"]
     if gyro is not None:
         lower, turn = _lower_and_turn(np.linalg.inv(gyro.matrix) @ imu_R_body.T)
+        felt = np.zeros((3, 3)) if calibration.g_sensitivity is None else calibration.g_sensitivity
         lines += ["  gyroscopes:", f"    # {gyro.unit_in} per {gyro.unit_out}"]
-        lines += [*_rows("    M", lower), *_rows("    C_gyro_i", turn), *_rows("    A", np.zeros((3, 3)))]
+        lines += [*_rows("    M", lower), *_rows("    C_gyro_i", turn), *_rows("    A", felt @ imu_R_body.T)]
         lines.append(f"    offset: {_numbers(gyro.offset)}  # {gyro.unit_in}")
     return "\n".join(lines) + "\n"
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from sequential.errors import DataError
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.still import StillDetector
 
-__all__ = ["Dwells", "find_dwells"]
+__all__ = ["Dwells", "find_dwells", "join_recordings"]
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -32,6 +34,7 @@ class Dwells:
     seconds : (K, 2) first and last instant, s after the recording's first sample
     accel_unit, gyro_unit : units of the means
     name : of the recording
+    part : (K,) number of the recording, where several were joined
     """
 
     start: Stamps
@@ -45,6 +48,11 @@ class Dwells:
     accel_unit: str = "m/s^2"
     gyro_unit: str = "rad/s"
     name: str = "recording"
+    part: Stamps = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        if len(self.part) != len(self.start):
+            object.__setattr__(self, "part", np.zeros(len(self.start), dtype=np.int64))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -67,7 +75,7 @@ def find_dwells(recording: ImuRecording, detector: StillDetector | None = None) 
         )
     length = max(2, round(BLOCK * recording.rate))
     times = recording.seconds
-    means: dict[str, Array] = {}
+    means: dict[str, Any] = {}
     for sensor in ("accel", "gyro"):
         values = getattr(recording, sensor)
         if values is not None:
@@ -82,6 +90,56 @@ def find_dwells(recording: ImuRecording, detector: StillDetector | None = None) 
         name=recording.name,
         **means,
     )
+
+
+def join_recordings(
+    recordings: Sequence[ImuRecording], detector: StillDetector | None = None
+) -> tuple[ImuRecording, Dwells]:
+    """Several recordings of one sensor as one, ten seconds apart, and the dwells of all.
+
+    Dwells are found in each by itself, so a recording may be of one position only.
+
+    Raises
+    ------
+    DataError
+        where they hold different sensors or units.
+    """
+    first = recordings[0]
+    for other in recordings[1:]:
+        for name in ("sensors", "accel_unit", "gyro_unit"):
+            if getattr(other, name) != getattr(first, name):
+                raise DataError(
+                    f"recordings to be joined differ in {name}: {first.name!r} has {getattr(first, name)}, "
+                    f"{other.name!r} {getattr(other, name)}; give units for both"
+                )
+    dwells = [find_dwells(one, detector) for one in recordings]
+    if len(recordings) == 1:
+        return first, dwells[0]
+    shifts = np.cumsum([0.0] + [one.duration + 10.0 for one in recordings[:-1]])
+    rows = np.cumsum([0] + [len(one) for one in recordings[:-1]])
+    name = " + ".join(one.name for one in recordings)
+
+    def stacked(field_name: str) -> Array | None:
+        parts = [getattr(one, field_name) for one in recordings]
+        return None if any(part is None for part in parts) else np.concatenate(parts)
+
+    stamps = [one.t - one.t[0] + np.int64(s * 1e9) for one, s in zip(recordings, shifts, strict=True)]
+    whole = ImuRecording(
+        np.concatenate(stamps),
+        stacked("accel"),
+        stacked("gyro"),
+        name=name,
+        accel_unit=first.accel_unit,
+        gyro_unit=first.gyro_unit,
+    )
+    joined: dict[str, Any] = {}
+    for key in ("rows", "accel", "accel_cov", "gyro", "gyro_cov"):
+        if getattr(dwells[0], key) is not None:
+            joined[key] = np.concatenate([getattr(one, key) for one in dwells])
+    for key, moved in (("start", rows), ("stop", rows), ("seconds", shifts)):
+        joined[key] = np.concatenate([getattr(one, key) + by for one, by in zip(dwells, moved, strict=True)])
+    part = np.repeat(np.arange(len(dwells)), [len(one) for one in dwells])
+    return whole, replace(dwells[0], name=name, part=part, **joined)
 
 
 def _averages(parts: list[Array], length: int) -> tuple[Array, Array]:

@@ -7,16 +7,16 @@ gyro's reading of gravity itself is taken off where the dwells show one, and the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import DataError, UnderConstrainedError
+from sequential.errors import UnderConstrainedError
 from sequential.sensors.calibration import AffineCalibration
 from sequential.sensors.dwells import Dwells
 from sequential.sensors.finding import Finding
-from sequential.sensors.gyro_integral import GyroIntervals, intervals_between, rotations, turned
+from sequential.sensors.gyro_case import GyroCase
 from sequential.sensors.gyro_rest import GyroAtRest, bias_at_rest
 from sequential.sensors.prior_fit import Fitted, Scatter, Unknowns, fit_with_scatter
 from sequential.sensors.recording import ImuRecording
@@ -52,8 +52,9 @@ class GyroFit:
 
     @property
     def leave_one_out_rms(self) -> float:
-        """Root mean square of `left_out` over the moves that were used, rad."""
-        return float(np.sqrt(np.mean(self.left_out[self.used] ** 2)))
+        """Root mean square of `left_out` over the moves that were used and are whole, rad."""
+        chosen = self.used & self.whole
+        return float(np.sqrt(np.mean(self.left_out[chosen if chosen.any() else self.used] ** 2)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class GyroBetweenDwells:
     edge: float = 0.3
     gain: float = 0.05
     cross: float = 0.05
-    scatter: Scatter = Scatter(5e-4, 1.0)
+    scatter: Scatter = field(default_factory=lambda: Scatter(5e-4, 1.0))
 
     def calibrate(
         self, recording: ImuRecording, dwells: Dwells, accel: AffineCalibration, *, used: Mask | None = None
@@ -91,18 +92,18 @@ class GyroBetweenDwells:
         assert dwells.accel is not None  # noqa: S101 - require() has looked
         rest = bias_at_rest(dwells, accel.apply(dwells.accel))
         good = np.ones(len(dwells), dtype=bool) if used is None else used
-        moves = np.flatnonzero(good[:-1] & good[1:])
+        moves = np.flatnonzero(good[:-1] & good[1:] & (dwells.part[:-1] == dwells.part[1:]))
         if len(moves) < FEWEST:
             raise UnderConstrainedError(
-                f"{recording.name!r} holds {len(moves)} moves between dwells, the gyro needs {FEWEST} at least: "
+                f"{recording.name!r} holds {len(moves)} moves between dwells, the gyro needs {FEWEST}: "
                 "turn the sensor to ten positions or more, about every axis"
             )
-        case = _Case.of(recording, dwells, accel, rest, moves, self)
+        case = GyroCase.of(recording, dwells, accel, rest, moves, self.edge)
         fit, chosen = self._without_impossible(case)
         _require_turned(recording.name, fit)
         return _result(recording, dwells, case, fit, chosen, moves)
 
-    def fit(self, case: _Case, used: Mask) -> Fitted:
+    def fit(self, case: GyroCase, used: Mask) -> Fitted:
         """Parameters (12,): the matrix over its nominal gain, row by row, and the offset times that gain."""
         centre = np.concatenate([np.eye(3).ravel(), case.rest.bias * case.gain])
         bias_sigma = np.sqrt(np.diag(case.rest.cov)) * case.gain + 1e-7
@@ -111,7 +112,7 @@ class GyroBetweenDwells:
         chosen = case.only(used)
         return fit_with_scatter(chosen.residuals, lambda _: chosen.noise, unknowns, self.scatter)
 
-    def _without_impossible(self, case: _Case) -> tuple[Fitted, Mask]:
+    def _without_impossible(self, case: GyroCase) -> tuple[Fitted, Mask]:
         """Leave out moves that the others make impossible, worst first, a quarter of them at most."""
         from scipy.special import stdtrit
 
@@ -126,94 +127,8 @@ class GyroBetweenDwells:
             used[np.flatnonzero(used)[worst]] = False
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Case:
-    """Moves to be explained: gravity before and after (S, 3), readings between, noise of the arrival."""
-
-    start: Array
-    end: Array
-    intervals: GyroIntervals
-    noise: Array  # (2 S,) rad²
-    gain: float  # nominal, rad/s per unit of the reading
-    rest: GyroAtRest
-
-    @classmethod
-    def of(
-        cls,
-        recording: ImuRecording,
-        dwells: Dwells,
-        accel: AffineCalibration,
-        rest: GyroAtRest,
-        moves: NDArray[np.int64],
-        settings: GyroBetweenDwells,
-    ) -> _Case:
-        assert recording.accel is not None  # noqa: S101 - the caller has looked
-        assert recording.gyro is not None  # noqa: S101
-        force = accel.apply(recording.accel)
-        if rest.g_sensitivity is not None:
-            recording = replace(recording, gyro=recording.gyro - force @ rest.g_sensitivity.T)
-        half = max(1, round(settings.edge * recording.rate / 2))
-        leave = np.maximum(dwells.stop[moves] - half, dwells.start[moves])
-        arrive = np.minimum(dwells.start[moves + 1] + half, dwells.stop[moves + 1])
-        start, start_noise = _directions(force, leave, half)
-        end, end_noise = _directions(force, arrive, half)
-        intervals = intervals_between(recording, leave, arrive)
-        gain = 1.0 if recording.gyro_unit == "rad/s" else _nominal_gain(start, end, intervals, rest.bias)
-        clipped = (intervals.clipped * gain * intervals.dt.max() * np.ptp(recording.gyro) / 10) ** 2
-        return cls(start, end, intervals, np.repeat(start_noise + end_noise + clipped, 2), gain, rest)
-
-    def only(self, used: Mask) -> _Case:
-        parts = self.intervals
-        kept = GyroIntervals(parts.raw[used], parts.dt[used], parts.clipped[used])
-        return replace(
-            self, start=self.start[used], end=self.end[used], intervals=kept, noise=self.noise[np.repeat(used, 2)]
-        )
-
-    def residuals(self, x: Array) -> tuple[Array, Array]:
-        """Arriving direction less the one read, in the plane across it (2 S,), and its derivative (2 S, 12)."""
-        turn = turned(x[:9].reshape(3, 3) * self.gain, x[9:] / self.gain, self.intervals)
-        arriving = np.einsum("sji,sj->si", turn.rotation, self.start)
-        across = _across(self.end)
-        off = np.einsum("sai,si->sa", across, arriving - self.end)
-        change = np.einsum("sai,sij->saj", across, _skew(arriving))
-        J = np.concatenate([change @ turn.by_matrix * self.gain, change @ turn.by_offset / self.gain], axis=2)
-        return off.ravel(), J.reshape(-1, 12)
-
-    def angles(self, matrix: Array, offset: Array) -> Array:
-        """Angle (S,) between arriving and measured direction, rad."""
-        arriving = np.einsum("sji,sj->si", rotations(matrix, offset, self.intervals)[:, -1], self.start)
-        cross = np.linalg.norm(np.cross(arriving, self.end), axis=1)
-        return np.asarray(np.arctan2(cross, np.sum(arriving * self.end, axis=1)))
-
-
-def _directions(force: Array, rows: NDArray[np.int64], half: int) -> tuple[Array, Array]:
-    """Unit mean (S, 3) of the samples around each row, and its variance per axis across (S,), rad²."""
-    found, noise = np.empty((len(rows), 3)), np.empty(len(rows))
-    for k, row in enumerate(rows.tolist()):
-        part = force[max(row - half, 0) : row + half + 1]
-        mean = part.mean(axis=0)
-        found[k] = mean / np.linalg.norm(mean)
-        noise[k] = part.var(axis=0).sum() / 3 / len(part) / float(mean @ mean)
-    return found, noise
-
-
-def _nominal_gain(start: Array, end: Array, intervals: GyroIntervals, bias: Array) -> float:
-    """One gain for all axes, where the unit of the readings is not known: the best of a coarse search."""
-    most = float(np.abs(intervals.raw - bias)[intervals.dt > 0].max())
-    trial = np.geomspace(0.3, 60.0, 90) / most  # the fastest move of a hand lies between, rad/s
-
-    def misfit(gain: float) -> float:
-        arriving = np.einsum("sji,sj->si", rotations(np.eye(3) * gain, bias, intervals)[:, -1], start)
-        return float(np.sum(np.minimum(np.sum((arriving - end) ** 2, axis=1), 0.1)))
-
-    costs = [misfit(gain) for gain in trial]
-    best = int(np.argmin(costs))
-    fine = np.geomspace(trial[max(best - 1, 0)], trial[min(best + 1, len(trial) - 1)], 15)
-    return float(fine[int(np.argmin([misfit(gain) for gain in fine]))])
-
-
 def _left_out(fit: Fitted) -> tuple[Array, Array]:
-    """Angle (S,) by which each move is missed when the others are fitted (linearised), and that over its sigma."""
+    """Angle (S,) by which each move is missed when the others are fitted (linearised), and over its sigma."""
     residual, J = fit.residual.reshape(-1, 2), fit.jacobian.reshape(-1, 2, fit.jacobian.shape[1])
     noise = fit.variance.reshape(-1, 2)[:, :, None] * np.eye(2)
     spread = J @ fit.cov @ J.transpose(0, 2, 1)
@@ -227,15 +142,15 @@ def _require_turned(name: str, fit: Fitted) -> None:
     unseen = [axis for axis, k in zip("xyz", (0, 4, 8), strict=True) if fit.kept[k] > FREE]
     if unseen:
         raise UnderConstrainedError(
-            f"the moves of {name!r} hardly turn about {' and '.join(unseen)}: the gyro's gain there stays unknown; "
-            "add moves about that axis while it is level"
+            f"the moves of {name!r} hardly turn about {' and '.join(unseen)}: the gyro's gain there stays "
+            "unknown; add moves about that axis while it is level"
         )
 
 
 def _result(
     recording: ImuRecording,
     dwells: Dwells,
-    case: _Case,
+    case: GyroCase,
     fit: Fitted,
     used: Mask,
     moves: NDArray[np.int64],
@@ -270,12 +185,14 @@ def _result(
     )
 
 
-def _findings(seconds: Array, case: _Case, fit: Fitted, used: Mask) -> tuple[Finding, ...]:
+def _findings(seconds: Array, case: GyroCase, fit: Fitted, used: Mask) -> tuple[Finding, ...]:
     found = []
     clipped = np.flatnonzero(case.intervals.clipped)
     if len(clipped):
         times = ", ".join(f"{seconds[k, 0]:.0f}-{seconds[k, 1]:.0f} s" for k in clipped)
-        what = f"the gyro reaches the end of its range in {len(clipped)} of {len(used)} moves, which weigh less"
+        what = (
+            f"the gyro reaches the end of its range in {len(clipped)} of {len(used)} moves, which weigh less"
+        )
         found.append(Finding("warn", what, times, "move more slowly, or choose a wider range"))
     found += [
         Finding("warn", "no constants explain this move, it was left out", f"{a:.1f}-{b:.1f} s", "repeat it")
@@ -290,18 +207,3 @@ def _findings(seconds: Array, case: _Case, fit: Fitted, used: Mask) -> tuple[Fin
         what = f"misalignment {', '.join(vague)} cannot be seen from these moves and stays near zero"
         found.append(Finding("warn", what, "", "add moves about the other axes"))
     return tuple(found)
-
-
-def _skew(v: Array) -> Array:
-    """[v]× (S, 3, 3): a frame turned right by δ sees v as v + v × δ."""
-    x, y, z = v.T
-    o = np.zeros_like(x)
-    return np.stack([np.stack([o, -z, y], -1), np.stack([z, o, -x], -1), np.stack([-y, x, o], -1)], -2)
-
-
-def _across(direction: Array) -> Array:
-    """Two unit vectors across each direction, (S, 2, 3)."""
-    away = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
-    first = np.cross(direction, away)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(direction, first)], axis=1)

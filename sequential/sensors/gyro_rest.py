@@ -82,6 +82,7 @@ def _weighted(values: Array, noise: Array, design: Array) -> tuple[Array, Array,
     found, covs, drift = np.empty((width, 3)), np.empty((3, width, width)), np.zeros(3)
     for axis in range(3):
         low, high = 0.0, float(np.var(values[:, axis])) + 1e-300
+        extra, normal = high, np.eye(width)
         for _ in range(60):
             extra = (low + high) / 2
             weight = 1 / (noise[:, axis] + extra + 1e-300)
