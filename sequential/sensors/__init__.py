@@ -13,17 +13,22 @@ from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import c_header, kalibr_yaml
 from sequential.sensors.characterize import Characteristics, characterize
 from sequential.sensors.characterize_step import StepResponse, step_response
-from sequential.sensors.dwells import Dwells, find_dwells
+from sequential.sensors.dwells import Dwells, find_dwells, join_recordings
 from sequential.sensors.estimate import Estimate
 from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY, local_gravity
+from sequential.sensors.gyro_dwells import GyroBetweenDwells, GyroFit
+from sequential.sensors.gyro_rest import GyroAtRest, bias_at_rest
 from sequential.sensors.imu_noise import ImuNoiseReport, imu_noise
 from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, stationary, tumble, waypoints
 from sequential.sensors.multi_position import AccelerometerFit, MultiPosition
 from sequential.sensors.noise_fit import Coefficient, NoiseFit, fit_noise
+from sequential.sensors.positions import best_next_direction, missing_positions
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simulate_imu
 from sequential.sensors.still import StillDetector
+from sequential.sensors.turns import KnownTurn, TurnFit, turn_gains
+from sequential.sensors.verify import Move, Verification, verify
 
 __all__ = [
     "SIX_POSITIONS",
@@ -36,29 +41,42 @@ __all__ = [
     "Dwells",
     "Estimate",
     "Finding",
+    "GyroAtRest",
+    "GyroBetweenDwells",
+    "GyroFit",
     "ImuCalibration",
     "ImuErrors",
     "ImuNoiseReport",
     "ImuRecording",
     "ImuSimulation",
     "ImuTruth",
+    "KnownTurn",
     "Motion",
+    "Move",
     "MultiPosition",
     "NoiseFit",
     "StepResponse",
     "StillDetector",
+    "TurnFit",
+    "Verification",
     "allan_deviation",
+    "best_next_direction",
+    "bias_at_rest",
     "c_header",
     "characterize",
     "constant_rate",
     "find_dwells",
     "fit_noise",
     "imu_noise",
+    "join_recordings",
     "kalibr_yaml",
     "local_gravity",
+    "missing_positions",
     "simulate_imu",
     "stationary",
     "step_response",
     "tumble",
+    "turn_gains",
+    "verify",
     "waypoints",
 ]
