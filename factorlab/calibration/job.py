@@ -128,7 +128,7 @@ def calibrate_gyro(
     if whole.gyro_unit != "rad/s":
         raise DataError(
             f"the gyro of {whole.name!r} is in {whole.gyro_unit}, and a recording at rest shows no "
-            "scale: give --units 'gyro=131 LSB/(deg/s)' or the like, known turns (--turn x=90), or use calibrate imu"
+            "scale: give --units gyro=…, or known turns (--turn x=90), or take calibrate imu"
         )
     cov = np.zeros((12, 12))
     cov[9:, 9:] = rest.cov

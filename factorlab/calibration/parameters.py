@@ -5,15 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from factorlab.calibration.job import Calibrated
+from sequential.sensors import AccelerometerFit, AffineCalibration
 
 __all__ = ["Parameter", "parameters_of"]
+
+Mask = NDArray[np.bool_]
+VAGUE = 0.7  # of the prior's width: the recording says nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One constant; `interval` is None where no covariance is known, `nominal` where there is none."""
+    """One constant; `interval` is None where no covariance is known, `nominal` where there is no such value.
+
+    `observed` is False where the recording does not show it and what is known beforehand stands.
+    """
 
     sensor: str
     name: str
@@ -21,7 +29,7 @@ class Parameter:
     interval: tuple[float, float] | None
     unit: str
     nominal: float | None
-    observed: bool = True
+    observed: bool
 
     def to_json(self) -> dict[str, object]:
         """Plain values under the names of the fields."""
@@ -32,80 +40,74 @@ def parameters_of(done: Calibrated) -> tuple[Parameter, ...]:
     """All constants of a job, in the order of a data sheet: gain, misalignment, offset; sensor by sensor."""
     found: list[Parameter] = []
     if done.accel is not None:
-        found += _accel(done)
-    gyro = done.calibration.gyro
-    if gyro is not None:
-        freedom = done.gyro.fit.freedom if done.gyro is not None else max(len(done.dwells) - 1.0, 1.0)
-        half = _t95(freedom)
-        sigma = np.sqrt(np.diag(gyro.cov)) if gyro.cov is not None else np.zeros(12)
-        si = gyro.unit_in == "rad/s"
-        for k, axis in enumerate("xyz"):
-            per, unit = (1.0, "") if si else (1.0, f"rad/s per {gyro.unit_in}")
-            found.append(
-                _one(
-                    "gyro",
-                    f"gain {axis}",
-                    gyro.matrix[k, k] * per,
-                    half * sigma[4 * k],
-                    unit,
-                    1.0 if si else None,
-                )
-            )
-        for row in range(3):
-            for column in range(3):
-                if row != column and done.gyro is not None:
-                    value = np.degrees(gyro.matrix[row, column] / gyro.matrix[column, column])
-                    spread = np.degrees(half * sigma[3 * row + column] / gyro.matrix[column, column])
-                    found.append(
-                        _one("gyro", f"misalignment {'xyz'[row]}{'xyz'[column]}", value, spread, "°", 0.0)
-                    )
-        scale, unit = (np.degrees(1.0), "°/s") if si else (1.0, gyro.unit_in)
-        for k, axis in enumerate("xyz"):
-            found.append(
-                _one(
-                    "gyro",
-                    f"offset {axis}",
-                    gyro.offset[k] * scale,
-                    half * sigma[9 + k] * scale,
-                    unit,
-                    0.0 if si else None,
-                )
-            )
+        found += _accel(done.accel)
+    if done.calibration.gyro is not None:
+        freedom = max(len(done.dwells) - 1.0, 1.0) if done.gyro is None else done.gyro.fit.freedom
+        kept = _kept(done)
+        found += _gyro(done.calibration.gyro, _t95(freedom), kept < VAGUE, crossed=done.gyro is not None)
     return tuple(found)
 
 
-def _accel(done: Calibrated) -> list[Parameter]:
-    accel = done.accel
-    assert accel is not None  # noqa: S101 - the caller has looked
+def _accel(accel: AccelerometerFit) -> list[Parameter]:
     fit, unit = accel.fit, accel.calibration.unit_in
-    si = unit == "m/s^2"
+    si, degree = unit == "m/s^2", np.degrees(1.0)
     half = _t95(fit.freedom + 1.0) * np.sqrt(np.diag(fit.cov))
-    names = [f"gain {a}" for a in "xyz"] + ["misalignment yx", "misalignment zx", "misalignment zy"]
-    names += [f"offset {a}" for a in "xyz"]
-    units = ["" if si else f"m/s² per {unit}"] * 3 + ["°"] * 3 + ["m/s²" if si else unit] * 3
-    nominal = [1.0 if si else None] * 3 + [0.0] * 3 + [0.0 if si else None] * 3
-    scale = np.concatenate([np.ones(3), np.full(3, np.degrees(1.0)), np.ones(3)])
-    shears = bool(np.any(fit.parameters[3:6] != 0.0))
-    return [
-        _one(
-            "accel",
-            names[k],
-            fit.parameters[k] * scale[k],
-            half[k] * scale[k],
-            units[k],
-            nominal[k],
-            fit.kept[k] < 0.7,
+    shears = bool(np.any(np.abs(fit.parameters[3:6]) > 1e-9))
+    kinds = (
+        ("gain", "xyz", 1.0, "" if si else f"m/s² per {unit.removesuffix('s')}", 1.0 if si else None),
+        ("misalignment", ("yx", "zx", "zy"), degree, "°", 0.0),
+        ("offset", "xyz", 1.0, "m/s²" if si else unit, 0.0 if si else None),
+    )
+    found = []
+    for block, (kind, places, scale, shown, nominal) in enumerate(kinds):
+        for k, place in enumerate(places, 3 * block):
+            if kind != "misalignment" or shears:
+                value, spread = float(fit.parameters[k] * scale), float(half[k] * scale)
+                limits = (value - spread, value + spread)
+                seen = bool(fit.kept[k] < VAGUE)
+                found.append(Parameter("accel", f"{kind} {place}", value, limits, shown, nominal, seen))
+    return found
+
+
+def _gyro(
+    gyro: AffineCalibration, factor: float, seen: NDArray[np.bool_], *, crossed: bool
+) -> list[Parameter]:
+    si, degree = gyro.unit_in == "rad/s", float(np.degrees(1.0))
+    half = factor * np.sqrt(np.diag(gyro.cov)) if gyro.cov is not None else np.zeros(12)
+    values = np.concatenate([gyro.matrix.ravel(), gyro.offset])
+    gains = np.diag(gyro.matrix)
+    found = []
+
+    def add(name: str, k: int, scale: float, unit: str, nominal: float | None) -> None:
+        value, spread = float(values[k] * scale), float(half[k] * abs(scale))
+        limits = (value - spread, value + spread) if spread > 0 else None
+        found.append(Parameter("gyro", name, value, limits, unit, nominal, bool(seen[k])))
+
+    for k, axis in enumerate("xyz"):
+        add(
+            f"gain {axis}",
+            4 * k,
+            1.0,
+            "" if si else f"rad/s per {gyro.unit_in.removesuffix('s')}",
+            1.0 if si else None,
         )
-        for k in range(9)
-        if shears or not 3 <= k < 6
-    ]
+    for k in (1, 2, 3, 5, 6, 7) if crossed else ():
+        name = f"misalignment {'xyz'[k // 3]}{'xyz'[k % 3]}"
+        add(name, k, degree / float(gains[k % 3]), "°", 0.0)
+    for k, axis in enumerate("xyz"):
+        scale, unit = (degree, "°/s") if si else (1.0, gyro.unit_in)
+        add(f"offset {axis}", 9 + k, scale, unit, 0.0 if si else None)
+    return found
 
 
-def _one(
-    sensor: str, name: str, value: float, half: float, unit: str, nominal: float | None, observed: bool = True
-) -> Parameter:
-    interval = (float(value - half), float(value + half)) if half > 0 else None
-    return Parameter(sensor, name, float(value), interval, unit, nominal, bool(observed))
+def _kept(done: Calibrated) -> NDArray[np.float64]:
+    """What the recording leaves of the prior (12,); the offset's prior is the recording's own rest."""
+    kept = np.zeros(12)
+    if done.gyro is not None:
+        kept[:9] = done.gyro.fit.kept[:9]
+    elif done.turns is not None:
+        kept[[0, 4, 8]] = done.turns.fit.kept[:3]
+    return kept
 
 
 def _t95(freedom: float) -> float:

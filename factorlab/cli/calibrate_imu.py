@@ -21,9 +21,9 @@ __all__ = ["accel", "gyro", "imu"]
 OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.argument("sources", metavar="LOG…", nargs=-1, required=True),
     recording_options,
-    click.option("--gravity", type=click.FloatRange(8, 12), metavar="M/S2", help="|g| there.  [default: 9.80665]"),
+    click.option("--gravity", type=click.FloatRange(8, 12), metavar="M/S2", help="|g|.  [default: 9.80665]"),
     click.option(
-        "--latitude", type=click.FloatRange(-90, 90), metavar="DEG", help="|g| of the place, by WGS 84, instead."
+        "--latitude", type=click.FloatRange(-90, 90), metavar="DEG", help="|g| of that place instead."
     ),
     click.option("--height", type=float, metavar="M", help="Height above the ellipsoid, with --latitude."),
     click.option("--window", type=click.FloatRange(min=0.05), default=0.5, show_default=True, metavar="S",
@@ -76,7 +76,7 @@ def accel(positions: str, **options: Any) -> int:
 
 @click.command(short_help="Gyro: bias at rest, gain from turns of known angle.")
 @click.option("--turn", "turns", multiple=True, metavar="AXIS=DEG",
-              help="Angle of each move between two still parts, in order: --turn x=90 --turn y=-360 …")  # fmt: skip
+              help="One a move between still parts, in order: --turn x=90 --turn y=-360 …")  # fmt: skip
 @click.option("--turn-sigma", type=click.FloatRange(min=0, min_open=True), default=0.5, show_default=True,
               metavar="DEG", help="How exactly the angles are known.")  # fmt: skip
 @shared_options

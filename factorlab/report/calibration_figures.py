@@ -22,7 +22,7 @@ AXES = ("#D55E00", "#009E73", "#0072B2")
 
 
 def intervals(parameters: tuple[Parameter, ...]) -> Figure | None:
-    """Constants less their nominal values, in a panel a kind; those without a nominal value less themselves."""
+    """Constants less their nominal values, a panel a kind; those without one less their mean."""
     groups: dict[tuple[str, str], list[Parameter]] = {}
     for one in parameters:
         if one.interval is not None:
@@ -47,15 +47,13 @@ def _interval_panel(ax: Axes, sensor: str, kind: str, members: list[Parameter]) 
         off = one.value - (centre or 0.0)
         scale = 100.0 / centre if relative and centre and kind == "gain" else 1.0
         half = (one.interval[1] - one.interval[0]) / 2
-        ax.errorbar(
-            off * scale,
-            k,
-            xerr=half * abs(scale),
-            fmt="o" if one.observed else "x",
-            color=AFTER,
-            capsize=3,
-            markersize=4,
-        )
+        look: dict[str, Any] = {
+            "fmt": "o" if one.observed else "x",
+            "color": AFTER,
+            "capsize": 3,
+            "markersize": 4,
+        }
+        ax.errorbar(off * scale, k, xerr=half * abs(scale), **look)
     ax.axvline(0.0, color="black", linewidth=0.8, linestyle="--")
     ax.set_yticks(range(len(members)), [m.name.split(" ")[1] for m in members])
     ax.set_ylim(len(members) - 0.5, -0.5)
@@ -140,14 +138,12 @@ def _shade(ax: Axes, done: Calibrated) -> None:
         ax.axvspan(start, stop, zorder=0, linewidth=0, **look)
 
 
-def coverage(done: Calibrated) -> Figure | None:
+def coverage(done: Calibrated, up: NDArray[np.float64]) -> Figure | None:
     """Both halves of the sphere of directions, seen along z, areas kept (Lambert)."""
     from sequential.sensors import best_next_direction
 
     if done.accel is None or done.dwells.accel is None:
         return None
-    up = done.accel.calibration.apply(done.dwells.accel)
-    up = up / np.linalg.norm(up, axis=1)[:, None]
     following, _ = best_next_direction(up)
     figure, axes = blank(4.0, 1, 2)
     for ax, sign in zip(axes[0], (1.0, -1.0), strict=True):

@@ -206,14 +206,17 @@ class ImuCalibration:
             changed |= {one.kind: one.apply(raw), f"{one.kind}_unit": one.unit_out if known else unit}
         return replace(recording, **changed)
 
-    def to_json(self) -> str:
-        """One JSON object with the version of its schema."""
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and strings with the version of the schema, as they stand in the JSON file."""
         head: dict[str, Any] = {"schema": SCHEMA, "version": SCHEMA_VERSION}
         body: dict[str, Any] = {one.kind: one.to_dict() for one in self.present}
         if self.g_sensitivity is not None:
             body["g_sensitivity"] = self.g_sensitivity.tolist()
-        return json.dumps(head | {"equation": "calibrated = matrix @ (raw - offset)"} | body, indent=1,
-                          allow_nan=False)  # fmt: skip
+        return head | {"equation": "calibrated = matrix @ (raw - offset)"} | body
+
+    def to_json(self) -> str:
+        """One JSON object."""
+        return json.dumps(self.to_dict(), indent=1, allow_nan=False)
 
     @classmethod
     def from_json(cls, text: str, where: str = "the calibration") -> ImuCalibration:

@@ -29,7 +29,17 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-NAMES = ("gain x", "gain y", "gain z", "shear yx", "shear zx", "shear zy", "offset x", "offset y", "offset z")
+NAMES = (
+    "gain x",
+    "gain y",
+    "gain z",
+    "misalignment yx",
+    "misalignment zx",
+    "misalignment zy",
+    "offset x",
+    "offset y",
+    "offset z",
+)
 SHEARS = ((1, 0), (2, 0), (2, 1))
 
 

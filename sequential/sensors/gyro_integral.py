@@ -64,10 +64,11 @@ def intervals_between(recording: ImuRecording, start: Stamps, stop: Stamps) -> G
 
 
 def saturated(values: Array) -> NDArray[np.bool_]:
-    """Rows (N,) with a reading at an end of its axis' range that is reached for two samples running."""
+    """Rows (N,) at an end of their axis' range, where the same reading stands there twice running."""
+    middle, spread = np.median(values, axis=0), np.ptp(values, axis=0)
     found = np.zeros(len(values), dtype=bool)
     for end in (values.max(axis=0), values.min(axis=0)):
-        at = np.abs(values - end) <= 1e-4 * np.ptp(values, axis=0)
+        at = (np.abs(values - end) <= 1e-9 * spread) & (np.abs(end - middle) > 0.2 * spread)
         running = (at[1:] & at[:-1]).any(axis=0)
         found |= (at & running).any(axis=1)
     return found

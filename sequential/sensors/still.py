@@ -19,6 +19,7 @@ __all__ = ["StillDetector", "window_variance"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+TURNING = 0.05  # of the fastest rate
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class StillDetector:
     def _rest(self, variance: Array, recording: ImuRecording) -> float:
         tiny = 1e-12 * float(variance.max()) + 1e-30  # a simulated sensor may be noiseless
         if self.initial is None:
-            return max(_mode(variance + tiny), tiny)
+            return max(float(np.exp(_mode(np.log(variance + tiny), 0.05))), tiny)
         inside = recording.seconds <= self.initial
         if inside.sum() < 2 * self.samples(recording):
             raise DataError(f"initial = {self.initial:g} s is less than two windows of {self.window:g} s")
@@ -85,7 +86,7 @@ class StillDetector:
     def find(self, recording: ImuRecording) -> list[NDArray[np.int64]]:
         """Rows of every dwell, in order; the rows of one are consecutive but for knocks left out."""
         variance, _, threshold = self.levels(recording)
-        still = variance <= threshold
+        still = (variance <= threshold) & ~self._turning(recording)
         half = self.samples(recording) // 2
         fewest = max(3, round(self.shortest * recording.rate))
         gap = round(self.knock * recording.rate) + 2 * half
@@ -95,6 +96,18 @@ class StillDetector:
             if own is not None and len(own) >= fewest:
                 found.append(start + own)
         return found
+
+    def _turning(self, recording: ImuRecording) -> Mask:
+        """Where the gyro's mean over a window is not its rest: a turn at a constant rate varies little."""
+        if recording.gyro is None:
+            return np.zeros(len(recording), dtype=bool)
+        count = self.samples(recording)
+        mean = window_mean(recording.gyro, count)
+        rest = np.array([_mode(column) for column in mean.T])
+        off = np.linalg.norm(mean - rest, axis=1)
+        noise = np.sqrt(np.quantile(window_variance(recording.gyro, count), 0.1) / count)
+        peak = float(np.linalg.norm(recording.gyro - rest, axis=1).max())
+        return np.asarray(off > max(TURNING * peak, 8 * noise))
 
     def _settled(self, variance: Array, still: Mask, fewest: int) -> NDArray[np.int64] | None:
         """Rows of a dwell whose variance is near the dwell's own level."""
@@ -110,27 +123,29 @@ def window_variance(values: Array, count: int) -> Array:
     Windows at the ends are the nearest whole ones.
     """
     centred = values - np.median(values, axis=0)
-    zero = np.zeros((1, values.shape[1]))
-    first = np.concatenate([zero, np.cumsum(centred, axis=0)])
-    second = np.concatenate([zero, np.cumsum(centred**2, axis=0)])
-    mean = (first[count:] - first[:-count]) / count
-    variance = np.sum((second[count:] - second[:-count]) / count - mean**2, axis=1)
+    squares = np.sum(window_mean(centred**2, count) - window_mean(centred, count) ** 2, axis=1)
+    return np.asarray(np.clip(squares, 0.0, None))
+
+
+def window_mean(values: Array, count: int) -> Array:
+    """Mean (N, 3) over the same windows."""
+    summed = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    mean = (summed[count:] - summed[:-count]) / count
     before = count // 2
-    padded = np.pad(np.clip(variance, 0.0, None), (before, count - 1 - before), mode="edge")
-    return np.asarray(padded)
+    return np.asarray(np.pad(mean, ((before, count - 1 - before), (0, 0)), mode="edge"))
 
 
-def _mode(values: Array) -> float:
-    """Most common magnitude: the half-sample mode of the logarithm (Bickel and Frühwirth, 2006)."""
-    ordered = np.sort(np.log(values))
+def _mode(values: Array, enough: float = 0.0) -> float:
+    """Most common value: the half-sample mode (Bickel and Frühwirth, 2006), to a width of `enough`."""
+    ordered = np.sort(values)
     while len(ordered) > 3:
         half = (len(ordered) + 1) // 2
         widths = ordered[half - 1 :] - ordered[: len(ordered) - half + 1]
         first = int(np.argmin(widths))
-        if widths[first] < 0.05:  # 5 %: nothing finer is to be had from a variance
-            return float(np.exp(np.median(ordered[first : first + half])))
         ordered = ordered[first : first + half]
-    return float(np.exp(ordered.mean()))
+        if widths[first] <= enough:
+            break
+    return float(np.median(ordered))
 
 
 def _parting(ratio: Array, bins: int = 128) -> float:
@@ -143,6 +158,8 @@ def _parting(ratio: Array, bins: int = 128) -> float:
     total = np.cumsum(counts * middle)
     with np.errstate(divide="ignore", invalid="ignore"):
         between = low * high * (total / low - (total[-1] - total) / high) ** 2
+    if not np.isfinite(between).any():
+        return 100.0  # one level only
     return float(np.clip(10 ** middle[int(np.nanargmax(between))], 3.0, 100.0))
 
 

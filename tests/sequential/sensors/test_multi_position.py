@@ -133,7 +133,7 @@ def test_mpu6050_and_xsens(data_dir):
     done = MultiPosition().calibrate(find_dwells(mpu6050(data_dir, "example_data_calibration")))
     assert len(done.used) == 10
     assert done.leave_one_out_rms == pytest.approx(0.0064, abs=0.001)
-    assert "shear yx" in str(done.findings[0])
+    assert "misalignment yx" in str(done.findings[0])
     done = MultiPosition().calibrate(find_dwells(xsens(data_dir)))
     assert len(done.used) == 38
     assert done.used.all()
