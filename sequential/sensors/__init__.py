@@ -14,7 +14,9 @@ from sequential.sensors.calibration_files import c_header, kalibr_yaml
 from sequential.sensors.characterize import Characteristics, characterize
 from sequential.sensors.characterize_step import StepResponse, step_response
 from sequential.sensors.dwells import Dwells, find_dwells, join_recordings
+from sequential.sensors.ellipsoid import FieldCheck, MagnetometerEllipsoid, MagnetometerFit
 from sequential.sensors.estimate import Estimate
+from sequential.sensors.ferraris import Ferraris, FerrarisFit
 from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY, local_gravity
 from sequential.sensors.gyro_dwells import GyroBetweenDwells, GyroFit
@@ -40,6 +42,9 @@ __all__ = [
     "Coefficient",
     "Dwells",
     "Estimate",
+    "Ferraris",
+    "FerrarisFit",
+    "FieldCheck",
     "Finding",
     "GyroAtRest",
     "GyroBetweenDwells",
@@ -51,6 +56,8 @@ __all__ = [
     "ImuSimulation",
     "ImuTruth",
     "KnownTurn",
+    "MagnetometerEllipsoid",
+    "MagnetometerFit",
     "Motion",
     "Move",
     "MultiPosition",
