@@ -197,7 +197,7 @@ def _reach(root: Array) -> Array:
     """(p,) sizes that a step should not exceed: of the gains, and of the radius."""
     dim = len(root)
     gain = np.trace(root) / dim
-    return np.r_[np.full(dim * (dim + 1) // 2, gain), np.full(dim, 1 / gain)]
+    return np.concatenate([np.full(dim * (dim + 1) // 2, gain), np.full(dim, 1 / gain)])
 
 
 def _moved(root: Array, centre: Array, step: Array) -> Ellipsoid:

@@ -4,7 +4,6 @@ import pytest
 from sequential.errors import DataError, MissingStreamError, UnderConstrainedError
 from sequential.readers import read_broad, read_imu
 from sequential.sensors import ImuRecording, MagnetometerEllipsoid
-from sequential.sensors.direction_cells import BANDS, CELLS, SECTORS, cell_means, cell_of, cell_words
 from sequential.sensors.ellipsoid_fit import (
     _derivative,
     _moved,
@@ -44,20 +43,6 @@ def recording(mag, unit="uT"):
 
 
 # --- the parts ---
-
-
-def test_cells_have_equal_area(rng):
-    count = cell_means(sphere(240_000, rng)).count
-    np.testing.assert_allclose(count, 10_000, rtol=0.06)
-    assert CELLS == BANDS * SECTORS == 24
-    assert cell_of(np.array([[0.0, 0.0, -1.0], [1.0, 1e-9, 0.9]])).tolist() == [3, 5 * 1 + 10 + 6]
-    assert cell_words(3) == "elevation -90° to -30°, azimuth 0° to 60°"
-
-
-def test_an_uneven_norm_has_a_spread(rng):
-    directions = sphere(50_000, rng)
-    norms = np.where(directions[:, 2] > 0, 1.1, 0.9)
-    np.testing.assert_allclose(cell_means(directions, norms).spread, 0.1, rtol=0.01)
 
 
 def test_excess_is_what_noise_adds_to_a_norm(rng):
@@ -190,7 +175,7 @@ def test_verification_uses_other_readings(rng):
     a, b = (recording(points(0, rng, directions=smooth_turns(5000, rng)[lag:])) for lag in (0, 700))
     fit = MagnetometerEllipsoid().calibrate(a)
     assert fit.verify(b).calibrated.spread < 0.006
-    shifted = recording(b.mag + [6.0, 0.0, 0.0])
+    shifted = recording(b.mag + np.array([6.0, 0.0, 0.0]))
     assert fit.verify(shifted).calibrated.spread > 0.05
     with pytest.raises(DataError, match="takes uT"):
         fit.verify(recording(b.mag, "counts"))
