@@ -89,7 +89,7 @@ def _arrays(file: Path) -> dict[str, Any]:
 
         try:
             return {k: v for k, v in scipy.io.loadmat(file).items() if not k.startswith("__")}
-        except (ValueError, NotImplementedError, OSError, TypeError) as fault:
+        except Exception as fault:  # noqa: BLE001 - a parser of binary files fails in many ways
             raise FileFormatError(
                 f"{file} is not a MAT file that SciPy reads ({fault}); save it with -v7"
             ) from None
@@ -102,7 +102,7 @@ def _arrays(file: Path) -> dict[str, Any]:
     try:
         with h5py.File(file, "r") as opened:
             return {**{k: v[()] for k, v in opened.items() if hasattr(v, "shape")}, **dict(opened.attrs)}
-    except OSError as fault:
+    except Exception as fault:  # noqa: BLE001 - as above
         raise FileFormatError(f"{file} is not an HDF5 file that can be read ({fault})") from None
 
 

@@ -40,8 +40,12 @@ class Export:
         """The text of a file inside."""
         if not self.zipped:
             return decoded((Path(self.where) / name).read_bytes(), f"{self.where}/{name}")
-        with zipfile.ZipFile(self.where) as archive:
-            return decoded(archive.read(name), f"{self.where}: {name}")
+        try:
+            with zipfile.ZipFile(self.where) as archive:
+                content = archive.read(name)
+        except Exception as fault:  # noqa: BLE001 - checksums, passwords, methods of compression
+            raise FileFormatError(f"{self.where}: {name} cannot be unpacked ({fault})") from None
+        return decoded(content, f"{self.where}: {name}")
 
 
 def open_export(path: str | os.PathLike[str]) -> Export:

@@ -46,18 +46,25 @@ def stamps_of(cells: Sequence[str], unit: Scale | None, where: str) -> tuple[Sta
     if unit is None:
         unit, finding = _guess(values)
         said.append(finding)
-    return _scaled(cells, values, unit), said
+    return _scaled(cells, values, unit, where), said
 
 
-def _scaled(cells: Sequence[str], values: Array, unit: Scale) -> Stamps:
+def _scaled(cells: Sequence[str], values: Array, unit: Scale, where: str) -> Stamps:
     known = np.isfinite(values)
     stamps = np.full(len(values), NO_STAMP)
     per_unit = unit.factor or 1.0
-    if np.abs(values[known]).max(initial=0.0) * per_unit < EXACT_BELOW:
+    if np.abs(values[known]).max(initial=0.0) < EXACT_BELOW / per_unit:
         stamps[known] = np.round(values[known] * per_unit).astype(np.int64)
     else:  # a float would lose the last digits of a Unix time
         whole = Decimal(int(per_unit))
-        stamps[known] = [round(Decimal(cells[k]) * whole) for k in np.flatnonzero(known).tolist()]
+        try:
+            stamps[known] = [round(Decimal(cells[k]) * whole) for k in np.flatnonzero(known).tolist()]
+        except OverflowError:
+            worst = int(np.argmax(np.where(known, np.abs(values), 0.0)))
+            raise FileFormatError(
+                f"{where}: the stamp {cells[worst]!r} of sample {worst} in {unit.name} is over 292 years "
+                "away; mend it, or state the unit of time with units t=…"
+            ) from None
     return _unwrapped(stamps, known, unit)
 
 

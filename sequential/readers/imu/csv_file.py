@@ -96,7 +96,7 @@ def _require_whole(layout: Layout, table: TextTable) -> None:
                 f"columns are {has}. Name it with columns {lost}=NAME"
             )
     if not layout.usable:
-        width = f"{len(table.rows[0])} columns without names" if not table.header else f"the columns {has}"
+        width = f"{table.width} columns without names" if not table.header else f"the columns {has}"
         raise FileFormatError(
             f"{table.where} has {width}; expected are {EXPECTED}. Say which is which with columns "
             "ax=NAME,ay=NAME,… (or their numbers, from 0): --columns on the command line"
@@ -121,7 +121,7 @@ def _stamps(
         if np.isfinite(numbers).all():
             t = np.round((numbers - numbers.min()) * (1e9 / stated)).astype(np.int64)
             return t, [Finding("note", f"stamps are sample numbers at {stated:g} Hz")]
-    return evenly(len(table.rows), stated), [
+    return evenly(len(table), stated), [
         Finding("note", f"there are no stamps; samples are even at {stated:g} Hz")
     ]
 

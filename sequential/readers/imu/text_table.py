@@ -26,20 +26,33 @@ DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*$")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TextTable:
-    """Rows of cells with the lines they stand on; `header` is empty where there is none.
+    """Lines of cells with their numbers in the file; `header` is empty where there is none.
 
-    `preamble` holds what stands above the header as KEY,VALUE.
+    `separator` None stands for blanks; `preamble` holds what stands above the header as KEY,VALUE.
     """
 
     where: str
     header: tuple[str, ...]
-    rows: list[list[str]]
+    body: list[str]
     lines: list[int]
+    separator: str | None
     preamble: dict[str, str]
+
+    def __len__(self) -> int:
+        return len(self.body)
+
+    @property
+    def width(self) -> int:
+        """Cells of the first row."""
+        return len(_split(self.body[:1], self.separator)[0])
 
     def text(self, column: int) -> list[str]:
         """The cells of one column; an empty text where a row ends before it."""
-        return [row[column] if column < len(row) else "" for row in self.rows]
+        found = []
+        for line in self.body:
+            cells = line.split(self.separator, column + 1)
+            found.append(cells[column].strip() if column < len(cells) else "")
+        return found
 
     def numbers(self, columns: Sequence[int]) -> Array:
         """(N, m) numbers, NaN where a cell is empty or says so.
@@ -50,13 +63,18 @@ class TextTable:
             naming line and column of a cell that is no number.
         """
         try:
-            return np.array([[row[c] for c in columns] for row in self.rows], dtype=np.float64)
+            return np.loadtxt(
+                self.body, delimiter=self.separator, usecols=columns, comments=None, ndmin=2, dtype=np.float64
+            )
         except (ValueError, IndexError):
-            pass
-        found = np.full((len(self.rows), len(columns)), np.nan)
-        for k, row in enumerate(self.rows):
+            return self._mended(columns)
+
+    def _mended(self, columns: Sequence[int]) -> Array:
+        """As `numbers`, cell by cell."""
+        found = np.full((len(self.body), len(columns)), np.nan)
+        for k, row in enumerate(_split(self.body, self.separator)):
             for j, column in enumerate(columns):
-                cell = row[column] if column < len(row) else ""
+                cell = row[column].strip() if column < len(row) else ""
                 if cell.lower() in MISSING:
                     continue
                 try:
@@ -115,20 +133,33 @@ def table_of(text: str, where: str, is_header: Callable[[Sequence[str]], bool]) 
     if not kept:
         raise FileFormatError(f"{where} is empty; a recording has a header such as t,ax,ay,az,gx,gy,gz")
     at, separator, header = _header(kept, is_header)
-    body = kept[at + 1 :] if header else kept[at:]
-    body = [(n, line) for n, line in body if not line.lstrip().startswith("#")]
-    rows = [_trimmed(row) for row in _split([line for _, line in body], separator)]
-    if separator != ",":
-        rows = _with_points(rows)
-    if header and rows and not any(_is_number(cell) for cell in rows[0]) and len(rows) > 1:
-        rows, body = rows[1:], body[1:]  # a second line of header: units, or axes
-    if not rows:
+    numbered = [(n, line) for n, line in kept[at + bool(header) :] if not line.lstrip().startswith("#")]
+    body = _plain([line for _, line in numbered], separator)
+    if header and len(body) > 1 and not any(map(_is_number, _split(body[:1], separator)[0])):
+        body, numbered = body[1:], numbered[1:]  # a second line of header: units, or axes
+    if not body:
         raise FileFormatError(f"{where} has a header and no sample; the recording is empty")
     preamble = {}
     for _, line in kept[:at]:
         key, _, value = line.strip('#" ').partition(_separator(line) or ":")
         preamble[key.strip().strip('"')] = value.strip().strip('"')
-    return TextTable(where, tuple(header), rows, [n for n, _ in body], preamble)
+    return TextTable(where, tuple(header), body, [n for n, _ in numbered], separator, preamble)
+
+
+def _plain(body: list[str], separator: str | None) -> list[str]:
+    """Lines without quotes, and with decimal points."""
+    if separator is not None and any('"' in line for line in body):
+        rows = csv.reader(body, delimiter=separator, skipinitialspace=True)
+        body = [separator.join(_bare(cell, separator) for cell in cells) for cells in rows]
+    if separator == ",":
+        return body
+    first = (cell for cells in _split(body[:200], separator) for cell in cells)
+    return [line.replace(",", ".") for line in body] if any(map(DECIMAL_COMMA.match, first)) else body
+
+
+def _bare(cell: str, separator: str) -> str:
+    """A cell that was quoted, without separators of its own."""
+    return cell.replace(",", "." if DECIMAL_COMMA.match(cell) else " ").replace(separator, " ")
 
 
 def _header(
@@ -141,7 +172,7 @@ def _header(
         cells = _trimmed(_split([line.lstrip("# ")], separator)[0])
         if is_header(cells):
             return at, separator, cells
-        if len(cells) > 2 and all(_is_number(cell) for cell in _with_points([cells])[0]):
+        if len(cells) > 2 and all(_is_number(cell.replace(",", ".")) for cell in cells):
             return worded or (at, separator, [])
         if len(cells) > 2 and worded is None:
             worded = at, separator, cells
@@ -169,13 +200,6 @@ def _trimmed(cells: list[str]) -> list[str]:
     while found and not found[-1]:
         found.pop()
     return found
-
-
-def _with_points(rows: list[list[str]]) -> list[list[str]]:
-    """Decimal commas become points, where the rows use them."""
-    if not any(DECIMAL_COMMA.match(cell) for row in rows[:200] for cell in row):
-        return rows
-    return [[cell.replace(",", ".") for cell in row] for row in rows]
 
 
 def _is_number(cell: str) -> bool:

@@ -39,8 +39,9 @@ def ulog_channels(path: str | os.PathLike[str]) -> Channels:
     if not file.read_bytes().startswith(b"ULog"):
         raise FileFormatError(f"{file} is not a ULog: it does not begin with the letters ULog")
     try:
-        log = ULog(os.fspath(file), TOPICS)
-    except (TypeError, ValueError, IndexError, KeyError, EOFError) as fault:
+        with file.open("rb") as opened:
+            log = ULog(opened, TOPICS)
+    except Exception as fault:  # noqa: BLE001 - a parser of binary files fails in many ways
         raise FileFormatError(
             f"{file} is a ULog that cannot be read ({fault}); copy it from the card again"
         ) from None

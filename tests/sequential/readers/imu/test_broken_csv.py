@@ -62,6 +62,12 @@ def test_no_complete_row(tmp_path):
         read_imu(written(tmp_path / "x.csv", "t,ax,ay,az,gx,gy,gz\n0,1,2,3,,,\n1,,,,1,2,3\n"))
 
 
+def test_stamps_beyond_reason(tmp_path):
+    text = "t [s],ax,ay,az\n0,0,0,9.8\n1e300,0,0,9.8\n"
+    with pytest.raises(FileFormatError, match=r"the stamp '1e300' of sample 1 in s is over 292 years"):
+        read_imu(written(tmp_path / "x.csv", text))
+
+
 def test_binary_files_are_told(tmp_path):
     path = tmp_path / "x.csv"
     path.write_bytes(b"\x00\x01\x02binary")

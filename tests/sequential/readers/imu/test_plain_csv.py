@@ -181,6 +181,13 @@ def test_quotes_comments_preamble_and_blank_lines(tmp_path, moving):
     assert len(read_imu(written(tmp_path / "x.csv", "\n".join(lines)))) == len(moving)
 
 
+def test_quoted_cells_with_commas_of_their_own(tmp_path, moving):
+    lines = [f'"a walk, fast",{line}' for line in rows(moving)]
+    lines[3] = '"x",' + ",".join(f'"{cell}"'.replace(".", ",") for cell in rows(moving)[3].split(","))
+    imu = read_imu(written(tmp_path / "x.csv", "\n".join(["label,t,ax,ay,az,gx,gy,gz", *lines])))
+    np.testing.assert_allclose(imu.accel, moving.accel, atol=1e-6)
+
+
 def test_a_header_of_two_lines(tmp_path, moving):
     lines = ["t,ax,ay,az,gx,gy,gz", "s,m/s2,m/s2,m/s2,rad/s,rad/s,rad/s", *rows(moving)]
     assert len(read_imu(written(tmp_path / "x.csv", "\n".join(lines)))) == len(moving)
