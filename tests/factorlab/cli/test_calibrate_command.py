@@ -99,11 +99,9 @@ def test_gyro_at_rest_and_by_turns(folder, tmp_path):
     speed = np.repeat([0.0, 0.8, 0.0, -0.8, 0.0], 200)[:, None] * [0.0, 1.0, 0.0]
     gyro = speed / 1.03 + 1e-3 * rng.standard_normal(speed.shape)
     accel = np.tile([0.0, 9.80665, 0.0], (len(gyro), 1)) + 0.01 * rng.standard_normal(speed.shape)
-    path = write_imu(ImuRecording(np.arange(len(gyro)) * 0.01, accel, gyro), tmp_path / "turns.csv")
+    write_imu(ImuRecording(np.arange(len(gyro)) * 0.01, accel, gyro), tmp_path / "turns.csv")
     degrees = np.degrees(1.6)
-    done = run(
-        "gyro", path or tmp_path / "turns.csv", "--turn", f"y={degrees}", "--turn", f"y=-{degrees}", "--json"
-    )
+    done = run("gyro", tmp_path / "turns.csv", "--turn", f"y={degrees}", "--turn", f"y=-{degrees}", "--json")
     assert done.exit_code == 0, done.stderr
     found = {p["name"]: p for p in json.loads(done.stdout)["parameters"]}
     assert found["gain y"]["value"] == pytest.approx(1.03, abs=5e-3)
