@@ -26,6 +26,7 @@ from sequential.sensors.motion import SIX_POSITIONS, Motion, constant_rate, stat
 from sequential.sensors.multi_position import AccelerometerFit, MultiPosition
 from sequential.sensors.noise_fit import Coefficient, NoiseFit, fit_noise
 from sequential.sensors.positions import best_next_direction, missing_positions
+from sequential.sensors.range_sensor import RangeFit, RangeSensor
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.simulate import ImuErrors, ImuSimulation, ImuTruth, simulate_imu
 from sequential.sensors.still import StillDetector
@@ -62,6 +63,8 @@ __all__ = [
     "Move",
     "MultiPosition",
     "NoiseFit",
+    "RangeFit",
+    "RangeSensor",
     "StepResponse",
     "StillDetector",
     "TurnFit",

@@ -33,7 +33,7 @@ class FerrarisFit:
 
     Parameters
     ----------
-    calibration : accelerometer and gyro; the gyro's without the influence of acceleration
+    calibration : accelerometer, gyro, and what the gyro reads of the specific force (g_sensitivity)
     accel_gain, accel_rotation : (3, 3) diagonal K_a in raw units per m/s², and R_a; matrix = (K_a R_a)^-1
     gyro_gain, gyro_rotation : the same of the gyro, K_g in raw units per rad/s
     g_sensitivity : (3, 3) K_ga, what a specific force adds to the gyro, raw units per m/s²
@@ -174,7 +174,7 @@ class Ferraris:
             recording.name,
         )
         return FerrarisFit(
-            ImuCalibration(accel, gyro),
+            ImuCalibration(accel, gyro, None, found.g_sensitivity),
             found.accel_gain,
             found.accel_rotation,
             found.gyro_gain,
