@@ -71,6 +71,9 @@ BESIDE = (
     "attitude.madgwick_kernel",
     "attitude.complementary_kernel",
     "attitude.tilt_kernel",
+    "attitude.smoother_forward_kernel",
+    "attitude.smoother_backward_kernel",
+    "attitude.smoother_dense_kernel",
     "sensors.allan_kernel",
 )
 ROOMS = (*KERNELS, *BESIDE, *MODELS)

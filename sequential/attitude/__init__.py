@@ -13,11 +13,15 @@ from sequential.attitude.estimator import AttitudeFilter
 from sequential.attitude.history import AttitudeHistory
 from sequential.attitude.madgwick import Madgwick
 from sequential.attitude.mahony import Mahony
+from sequential.attitude.smoother import AttitudeSmoother
+from sequential.attitude.smoother_model import AttitudeModel
 from sequential.attitude.tilt_kalman import TiltKalman
 
 __all__ = [
     "AttitudeFilter",
     "AttitudeHistory",
+    "AttitudeModel",
+    "AttitudeSmoother",
     "ComplementaryAttitude",
     "Madgwick",
     "Mahony",

@@ -1,0 +1,132 @@
+"""The offline attitude smoother: every sample judged with the whole recording in hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.attitude.estimator import in_threads
+from sequential.attitude.history import AttitudeHistory
+from sequential.attitude.smoother_chain import AttitudeChain, ChainSolution, attitude_chain
+from sequential.attitude.smoother_model import AttitudeModel
+from sequential.errors import ModelError
+from sequential.sensors.recording import ImuRecording
+
+__all__ = ["AttitudeSmoother", "attitude_history"]
+
+Array = NDArray[np.float64]
+DISTRUST = 0.25  # weight below which a reading of the field counts as disturbed
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class AttitudeSmoother:
+    """Iterated smoothing of orientation, gyro errors and velocity from a whole recording.
+
+    The gyro is integrated over nodes of a tenth of a second.  The chain of nodes knows the specific force
+    (a body that does not run away has a velocity about zero, so the mean force over a few seconds points
+    up), the magnetometer through the east component of the field alone (strength and dip say how far to
+    trust it), and moments of rest, found with hindsight.  Bias, gain and misalignment of the gyro, bias of
+    the accelerometer and delay of the magnetometer are estimated on the way.
+
+    Parameters
+    ----------
+    model : noises
+    iterations : passes about the smoothed trajectory; before them comes an extended filter and its smoother
+    magnetometer : use it (9-D) or not (6-D); None where the recording has one
+    free_heading : also give `heading_free`, the answer without magnetometer, for one pass more
+
+    Notes
+    -----
+    Rauch, Tung, Striebel 1965; in the form of Bryson and Frazier, which inverts nothing (Bierman 1973);
+    iterated as in Bell 1994, The iterated Kalman smoother as a Gauss-Newton method.
+    """
+
+    model: AttitudeModel = field(default_factory=AttitudeModel)
+    iterations: int = 2
+    magnetometer: bool | None = None
+    free_heading: bool = True
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1:
+            raise ModelError(f"AttitudeSmoother.iterations must be at least 1, got {self.iterations}")
+
+    @property
+    def name(self) -> str:
+        """smoother."""
+        return "smoother"
+
+    def estimate(self, recording: ImuRecording) -> AttitudeHistory:
+        """Orientation at every sample, with covariance.
+
+        Raises
+        ------
+        MissingStreamError, DataError
+            where there is no gyro, no accelerometer, or no magnetometer although one is asked for; where the
+            magnetometer is stuck.
+        """
+        if self.magnetometer:
+            recording.require("mag", si=False)
+        chain = attitude_chain(recording, self.model, field=self.magnetometer is not False)
+        solution = self.solve(chain)
+        free = None
+        if chain.field and self.free_heading:
+            free = chain.solve(solution, field=False)
+        return attitude_history(recording, chain, solution, free, self.name)
+
+    def estimate_many(
+        self, recordings: Iterable[ImuRecording], threads: int | None = None
+    ) -> list[AttitudeHistory]:
+        """Every recording by `estimate`, in threads: as many as there are processors unless given."""
+        return in_threads(self.estimate, recordings, threads)
+
+    def solve(self, chain: AttitudeChain) -> ChainSolution:
+        """First pass, then passes about it with the field weighed anew each time."""
+        solution = chain.solve(weight=chain.first_weights() if chain.field else None, covariance=False)
+        for left in range(self.iterations, 0, -1):
+            weight = chain.weights(solution) if chain.field else None
+            solution = chain.solve(solution, weight=weight, covariance=left == 1)
+        return solution
+
+
+def attitude_history(
+    recording: ImuRecording,
+    chain: AttitudeChain,
+    solution: ChainSolution,
+    free: ChainSolution | None,
+    name: str,
+) -> AttitudeHistory:
+    """Give every sample its orientation from the nodes around it."""
+    q, cov, bias, bias_cov = _dense(chain, solution, heading=chain.field)
+    unaided, unaided_cov = (None, None) if free is None else _dense(chain, free, heading=False)[:2]
+    samples = np.diff(chain.first)
+    return AttitudeHistory(
+        recording.t,
+        q,
+        heading_free=unaided,
+        cov=cov,
+        cov_6d=unaided_cov if chain.field else cov,
+        gyro_bias=bias,
+        gyro_bias_cov=bias_cov,
+        rest=np.repeat(chain.rest, samples),
+        magnetic_disturbance=np.repeat(solution.trust < DISTRUST, samples) if chain.field else None,
+        name=name,
+    )
+
+
+def _dense(chain: AttitudeChain, solution: ChainSolution, *, heading: bool) -> tuple[Array, ...]:
+    from sequential.attitude.smoother_dense_kernel import densify
+
+    count, model = len(chain.gyro), chain.model
+    q, cov = np.empty((count, 4)), np.empty((count, 3, 3))
+    bias, bias_cov = np.empty((count, 3)), np.empty((count, 3, 3))
+    extra = np.array([0.0, 0.0, model.heading_sigma**2 if heading else 0.0])
+    densify(
+        chain.dt, chain.gyro, chain.first, chain.rest, solution.rotation, solution.state, solution.cov,
+        model.latency, model.latency_sigma, extra, q, cov, bias, bias_cov,
+    )  # fmt: skip
+    return q, cov, bias, bias_cov
