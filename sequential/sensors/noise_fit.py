@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import DataError, ShapeError
 from sequential.sensors.allan import read_series
-from sequential.sensors.noise_band import judge, usable
+from sequential.sensors.noise_band import judge, moves_smoothly, usable, without_spikes
 from sequential.sensors.noise_likelihood import drift, profile
 from sequential.sensors.noise_spectrum import COMPONENTS, cosine_spectrum
 
@@ -27,6 +27,7 @@ NAMES: dict[Term, str] = {
     "R": "drift",
 }
 FEWEST = 64
+STRAIGHT = 1e-12
 # Records of 100 N²/B² seconds show flicker, of 80 N/K and 50 B²/K² a random walk, nine times in ten, by Monte
 # Carlo.
 FLICKER_IN_WHITE, WALK_IN_WHITE, WALK_IN_FLICKER = 100.0, 80.0, 50.0
@@ -64,6 +65,8 @@ class NoiseFit:
     top : frequency below which the spectrum was used, Hz
     lines : periodic disturbances that were left out, each (frequency Hz, rms u)
     misfit : (from Hz, to Hz, power over that of the fit) where the spectrum is unlike these noises, or None
+    smooth : whether the slowest motion is smoother than a random walk, as in a warm-up
+    spikes : lone outliers that were replaced
     repeats : share of samples that repeat the one before
     unit : u, for texts
     """
@@ -78,6 +81,8 @@ class NoiseFit:
     top: float
     lines: tuple[tuple[float, float], ...]
     misfit: tuple[float, float, float] | None
+    smooth: bool
+    spikes: int
     repeats: float
     unit: str = ""
 
@@ -156,8 +161,12 @@ def fit_noise(x: ArrayLike, rate: float, *, unit: str = "") -> NoiseFit:
             f"all {len(series)} samples are {series[0, 0]:g}: the axis is stuck, or its noise is below its "
             "resolution"
         )
-    axis = np.ascontiguousarray(series[:, 0])
+    axis, spikes = without_spikes(np.ascontiguousarray(series[:, 0]))
     whole = cosine_spectrum(axis)
+    if not whole.scale > STRAIGHT * np.ptp(axis):
+        raise DataError(
+            f"the {len(axis)} samples lie on a straight line; a sensor at rest has noise: is it one?"
+        )
     spectrum, fit = usable(whole)
     scale = spectrum.scale
     units = scale * np.array([1 / rate, rate**-0.5, 1.0, rate**0.5])
@@ -177,6 +186,8 @@ def fit_noise(x: ArrayLike, rate: float, *, unit: str = "") -> NoiseFit:
         top=top * rate,
         lines=tuple((f * rate, rms * scale) for f, rms in spectrum.lines),
         misfit=None if wrong is None else (wrong[0] * rate, wrong[1] * rate, wrong[2]),
+        smooth=moves_smoothly(spectrum, fit),
+        spikes=spikes,
         repeats=float(np.mean(np.diff(axis) == 0.0)),
         unit=unit,
     )

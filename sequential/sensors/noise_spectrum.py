@@ -119,7 +119,7 @@ def cosine_spectrum(x: Array) -> CosineSpectrum:
     slope = float(t @ rest / (t @ t))
     rest = rest - slope * t
     scale = float(np.sqrt(rest @ rest / count))
-    value = dct(rest / scale, type=2, norm="ortho")[1:]
+    value = dct(rest / max(scale, 1e-300), type=2, norm="ortho")[1:]
     size = min(LOW, count // 4 * 2)
     weight = weights(np.arange(1.0, size + 1.0), count)
     weight[2] = 0.0
@@ -136,7 +136,7 @@ def cosine_spectrum(x: Array) -> CosineSpectrum:
     return CosineSpectrum(
         count,
         scale,
-        slope / scale,
+        slope / max(scale, 1e-300),
         (low[0], low[1]),
         power * kept,
         freedom * kept,

@@ -79,6 +79,13 @@ def _disturbances(fit: NoiseFit) -> list[str]:
         where = ", ".join(f"{f:.3g} Hz (rms {rms:.2g})" for f, rms in largest)
         more = f" and {len(fit.lines) - 3} more" if len(fit.lines) > 3 else ""
         said.append(f"Something vibrates at {where}{more}; these lines were left out.")
+    if fit.spikes:
+        said.append(f"{fit.spikes} lone outliers were replaced by the median around them.")
+    if fit.smooth:
+        said.append(
+            "The slowest motion is smoother than a random walk, as in a warm-up or a change of temperature: "
+            "K and B tell its size, no more. Let the sensor warm up, or leave the beginning out."
+        )
     if fit.misfit is not None:
         low, high, share = fit.misfit
         said.append(

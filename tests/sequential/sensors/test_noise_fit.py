@@ -153,6 +153,27 @@ def test_a_moving_sensor_is_noticed(rng):
     assert "touched or vibrated" in " ".join(fit.notes) or "left out" in " ".join(fit.notes)
 
 
+@pytest.mark.parametrize("height", [50.0, -1000.0])
+def test_lone_outliers_are_replaced_and_counted(height, rng):
+    x = rng.standard_normal(20_000)
+    at = rng.choice(19_000, 30, replace=False) // 2 * 2 + 500
+    spiked = x.copy()
+    spiked[at] += height
+    fit = fit_noise(spiked, 100.0)
+    assert fit.spikes == len(set(at))
+    assert fit.N.value == pytest.approx(fit_noise(x, 100.0).N.value, rel=0.01)
+    assert f"{fit.spikes} lone outliers were replaced" in " ".join(fit.notes)
+
+
+def test_a_warm_up_is_told_from_a_walk(rng):
+    t = np.arange(20_000) / 100.0
+    warm = fit_noise(0.1 * rng.standard_normal(len(t)) + 5.0 * np.exp(-t / 30.0), 100.0)
+    assert warm.smooth
+    assert "as in a warm-up" in " ".join(warm.notes)
+    walk = fit_noise(still_sensor(rng, len(t), 100.0, N=0.1, K=0.1), 100.0)
+    assert not walk.smooth
+
+
 def test_a_coarse_resolution_is_said(rng):
     fit = fit_noise(np.round(0.3 * rng.standard_normal(5000)), 100.0)
     assert "repeat the one before" in " ".join(fit.notes)
@@ -163,6 +184,7 @@ def test_a_coarse_resolution_is_said(rng):
     [
         (np.arange(63.0), DataError, "64 samples at least, got 63: record for 3.2 s or more"),
         (np.full(100, 0.25), DataError, "all 100 samples are 0.25: the axis is stuck"),
+        (np.arange(100.0) * 0.1, DataError, "the 100 samples lie on a straight line"),
         (np.ones((100, 3)), ShapeError, "call it for each column"),
         (np.append(np.arange(100.0), np.nan), NotFiniteError, "nan at sample 100"),
     ],
