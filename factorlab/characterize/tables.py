@@ -30,7 +30,7 @@ def sections_at_rest(study: Study, lang: Language) -> Iterator[Section]:
         ("drift", _levels(lang), "drift"),
         ("resolution", RESOLUTION, "oversampling"),
         ("spectrum", (), "spectra"),
-        ("allan", _terms(study, lang), ""),
+        ("allan", _terms(study, lang), "allan"),
         ("timing", TIMING, ""),
     ):
         yield Section(

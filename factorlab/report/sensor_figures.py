@@ -3,35 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+from numpy.typing import NDArray
 
+from factorlab.characterize.channels import Channel
 from factorlab.characterize.engine import Study
 from factorlab.characterize.words import group_name, say
+from factorlab.report.allan_figure import AllanPanel, accel_panel, allan_figure, gyro_panel
 from factorlab.report.style import blank, legend_below, log_axis, thin
 from factorlab.report.words import Language
 from sequential.sensors import Characteristics, StepResponse
 
-__all__ = ["drift", "histograms", "oversampling", "spectra", "steps"]
+__all__ = ["allan", "drift", "histograms", "oversampling", "spectra", "steps"]
 
+Array = NDArray[np.float64]
 COLOURS = ("#D55E00", "#0072B2", "#009E73")
 MEANS = 120  # of a recording, over its noise
 DENSE = 4000
+BANDS = 220
 
 
 def _decimal(axes: Axes, lang: Language) -> None:
     """Decimal commas on plain axes of a French page."""
     if lang == "fr":
-        for axis, scale in ((axes.xaxis, axes.get_xscale()), (axes.yaxis, axes.get_yscale())):
-            if scale == "linear":
-                axis.set_major_formatter(
-                    FuncFormatter(lambda v, _: f"{v:.6g}".replace("-", "−").replace(".", ","))
-                )
-            else:
-                axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}".replace(".", ",")))
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(_with_comma))
+
+
+def _with_comma(value: float, _: object) -> str:
+    return f"{value:.6g}".replace("-", "−").replace(".", ",")
 
 
 def _grid(study: Study, height: float) -> tuple[Figure, list[tuple[Axes, Characteristics, str]]]:
@@ -67,6 +72,7 @@ def histograms(study: Study, lang: Language) -> Callable[[], Figure]:
             axes.set_title(one.name)
             axes.set_xlabel(say(lang, "f_deviation", unit=one.unit))
             axes.set_yticks([])
+            axes.xaxis.set_major_locator(MaxNLocator(5))
             _decimal(axes, lang)
         legend_below(figure, placed[0][0])
         return figure
@@ -79,19 +85,25 @@ def drift(study: Study, lang: Language) -> Callable[[], Figure]:
 
     def draw() -> Figure:
         figure, placed = _grid(study, 2.3)
-        for axes, one, colour in placed:
-            _level(axes, one, colour, lang)
+        for (axes, one, colour), channel in zip(placed, _in_order(study), strict=True):
+            _level(axes, one, channel.values - one.bias.value, colour, lang)
         legend_below(figure, placed[0][0])
         return figure
 
     return draw
 
 
-def _level(axes: Axes, one: Characteristics, colour: str, lang: Language) -> None:
-    known = np.isfinite(one.residual)
-    t, y = one.t[known], one.residual[known]
+def _in_order(study: Study) -> list[Channel]:
+    """Channels as `_grid` places them."""
+    return [study.channels[k] for rows in study.groups().values() for k in rows]
+
+
+def _level(
+    axes: Axes, one: Characteristics, values: NDArray[np.float64], colour: str, lang: Language
+) -> None:
+    known = np.isfinite(one.residual)  # outliers are left out
+    t, y = one.t[known], values[known]
     middle = float(t.mean())
-    y = y + one.drift.value * (t - middle)
     minutes = t[-1] > 240.0
     scale = 1.0 / 60.0 if minutes else 1.0
     shown = thin(len(t), DENSE)
@@ -124,14 +136,15 @@ def spectra(study: Study, lang: Language) -> Callable[[], Figure]:
             for k, colour in zip(rows, _colours(len(rows)), strict=True):
                 one = study.axes[k]
                 seen = one.spectrum
-                low, high = (seen.density * factor for factor in seen.interval)
-                panel.fill_between(seen.frequency, low, high, color=colour, alpha=0.12, linewidth=0)
-                panel.plot(seen.frequency, seen.density, color=colour, linewidth=0.9, label=one.name)
+                hz, density = _in_bands(seen.frequency, seen.density)
+                panel.plot(hz, density, color=colour, linewidth=1.1, label=one.name)
                 panel.axhline(seen.white, color=colour, linestyle=":", linewidth=1.0)
                 for hz, _ in seen.lines[:3]:
                     panel.axvline(hz, color=colour, linestyle="--", linewidth=0.6)
             log_axis(panel, "x")
             panel.set_yscale("log")
+            if lang == "fr":
+                panel.xaxis.set_major_formatter(FuncFormatter(_with_comma))
             panel.set_xlabel(say(lang, "f_frequency"))
             unit = study.axes[rows[0]].unit
             panel.set_title(say(lang, "f_psd", group=group_name(group, lang), unit=unit))
@@ -141,8 +154,39 @@ def spectra(study: Study, lang: Language) -> Callable[[], Figure]:
     return draw
 
 
+def _in_bands(hz: Array, density: Array) -> tuple[Array, Array]:
+    """Means over bands as wide as a share of their frequency, so that a flat spectrum looks flat."""
+    edges = np.unique(np.geomspace(1, len(hz) + 1, BANDS).astype(int)) - 1
+    size = np.diff(edges)
+    return np.add.reduceat(hz, edges[:-1]) / size, np.add.reduceat(density, edges[:-1]) / size
+
+
 def _colours(count: int) -> Iterable[str]:
     return (COLOURS[k % 3] for k in range(count))
+
+
+def allan(study: Study, lang: Language) -> Callable[[], Figure | None]:
+    """Allan deviations of every sensor with the slopes read from them."""
+
+    def draw() -> Figure | None:
+        panels = []
+        for group, rows in study.groups().items():
+            if group not in study.slow.deviations:
+                continue
+            names = [study.channels[k].name for k in rows]
+            fits = [study.slow.fits[name] for name in names if name in study.slow.fits]
+            fits = fits if len(fits) == len(names) else []
+            deviation, title = study.slow.deviations[group], group_name(group, lang)
+            unit = study.axes[rows[0]].unit
+            if group == "gyro" and unit == "rad/s":
+                panels.append(replace(gyro_panel(deviation, fits, title), names=names))
+            elif group == "accel" and unit == "m/s²":
+                panels.append(replace(accel_panel(deviation, fits, title), names=names))
+            else:
+                panels.append(AllanPanel(title, deviation, fits, names, unit))
+        return allan_figure(panels, lang) if panels else None
+
+    return draw
 
 
 def oversampling(study: Study, lang: Language) -> Callable[[], Figure]:
