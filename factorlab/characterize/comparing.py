@@ -23,11 +23,14 @@ def against_declared(study: Study, lang: Language) -> Iterator[Verdict]:
         declared = study.declared.sigma_of(channel)
         if declared is None or one.stuck:
             continue
-        sigma = one.noise.sigma
+        sigma = one.noise.reading_sigma
         ratio = sigma.scaled(1.0 / declared)
         band = ratio.low**2, ratio.high**2
         words, status = _judged(ratio.value**2, band, channel.name, declared, sigma.value, one.unit, lang)
-        yield Verdict(say(lang, "declared", axis=channel.name), ratio.value**2, band, status, *words)
+        meaning = words[0] + (say(lang, "r_fast") if one.noise.moving else "")
+        yield Verdict(
+            say(lang, "declared", axis=channel.name), ratio.value**2, band, status, meaning, words[1]
+        )
 
 
 def _judged(

@@ -9,7 +9,7 @@ import numpy as np
 
 from factorlab.characterize.comparing import judged_density
 from factorlab.characterize.engine import Study
-from factorlab.characterize.words import group_name, say
+from factorlab.characterize.words import group_name, largest_of, say
 from factorlab.report.document import Status, Verdict
 from factorlab.report.words import Language
 from sequential.noise import ImuNoise
@@ -44,7 +44,7 @@ def _white(fits: Fits, group: str, lang: Language) -> Iterator[Verdict]:
         return
     name, fit = _largest(seen, lambda one: one.N.value)
     unit = coefficient_unit("N", fit.unit)
-    meaning = say(lang, "allan_n", group=group_name(group, lang), second=fit.N.value, unit=fit.unit)
+    meaning = say(lang, "allan_n", which=largest_of(group, name, lang), second=fit.N.value, unit=fit.unit)
     if fit.unit == "rad/s":
         degrees = float(np.degrees(fit.N.value))
         meaning += say(lang, "allan_n_gyro", deg=degrees, hour=60.0 * degrees)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from factorlab.characterize.engine import Study
-from factorlab.characterize.words import group_name, say
+from factorlab.characterize.words import group_name, largest_of, say
 from factorlab.report.document import Status, Verdict
 from factorlab.report.words import Language, number
 from sequential.sensors import Characteristics, Estimate
@@ -16,12 +16,12 @@ __all__ = ["at_rest"]
 
 Axes = list[Characteristics]
 STANDARD_GRAVITY = 9.80665
-MOVING = 5.0  # σ over that of neighbours
 TURN = np.radians(0.05)  # rad/s of gyro bias below which nobody minds
 OFF_GRAVITY = 0.01
 LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
 LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
 LOUD = 0.02  # share of the noise power in a line that is worth a warning
+RARE, FAR_OUT = 1e-4, 15.0  # share of outliers, and σ of a typical one, below which nobody minds
 LATE = 0.05  # jitter over the interval
 
 
@@ -55,8 +55,8 @@ def _stuck(one: Characteristics, lang: Language) -> Verdict:
 def _moving(axes: Axes, lang: Language) -> Iterator[Verdict]:
     """Readings that go much farther than they differ from one to the next are no noise."""
     one = _worst(axes, lambda axis: axis.noise.sigma.value / max(axis.noise.step_sigma, 1e-300))
-    times = one.noise.sigma.value / max(one.noise.step_sigma, 1e-300)
-    if times > MOVING and one.noise.step_sigma > 0.0:
+    if one.noise.moving:
+        times = one.noise.sigma.value / one.noise.step_sigma
         words = say(lang, "moving_means", x=times), say(lang, "moving_do")
         yield Verdict(say(lang, "moving", axis=one.name), times, None, "WARN", *words)
 
@@ -68,7 +68,7 @@ def _sigma(axes: Axes, group: str, lang: Language) -> Verdict:
     meaning = say(
         lang,
         key,
-        group=group_name(group, lang),
+        which=largest_of(group, one.name, lang),
         corr=noise.correlation,
         r=noise.sigma.value**2,
         unit=one.unit,
@@ -235,7 +235,7 @@ def _outliers(axes: Axes, group: str, lang: Language) -> Verdict:
         sigmas=seen.typical_sigmas,
         largest=seen.largest,
     )
-    status: Status = "WARN" if seen.share.low > 1e-4 else "INFO"
+    status: Status = "WARN" if seen.share.low > RARE or seen.typical_sigmas > FAR_OUT else "INFO"
     return Verdict(metric, seen.share.value, share, status, meaning, say(lang, "outliers_do"))
 
 

@@ -8,7 +8,7 @@ from importlib import resources
 
 from factorlab.report.words import Language, number
 
-__all__ = ["group_name", "say"]
+__all__ = ["group_name", "largest_of", "say"]
 
 
 @cache
@@ -27,3 +27,8 @@ def group_name(group: str, lang: Language) -> str:
     """A sensor as people call it; the name of a column as it is."""
     known = catalogue().get(f"sensor_{group}")
     return known[lang] if known else group
+
+
+def largest_of(group: str, axis: str, lang: Language) -> str:
+    """`, the largest of the gyro`; nothing for a column that stands alone."""
+    return "" if group == axis else say(lang, "largest_of", group=group_name(group, lang))

@@ -139,8 +139,8 @@ def spectra(study: Study, lang: Language) -> Callable[[], Figure]:
                 hz, density = _in_bands(seen.frequency, seen.density)
                 panel.plot(hz, density, color=colour, linewidth=1.1, label=one.name)
                 panel.axhline(seen.white, color=colour, linestyle=":", linewidth=1.0)
-                for hz, _ in seen.lines[:3]:
-                    panel.axvline(hz, color=colour, linestyle="--", linewidth=0.6)
+                for line, _ in seen.lines[:3]:
+                    panel.axvline(line, color=colour, linestyle="--", linewidth=0.6)
             log_axis(panel, "x")
             panel.set_yscale("log")
             if lang == "fr":

@@ -15,6 +15,7 @@ __all__ = ["Distribution", "Noise", "distribution_of", "noise_of"]
 Array = NDArray[np.float64]
 LEAST_KURTOSIS = -1.8  # of any distribution it is -2; a variance is never known better than this allows
 FEWEST_DEGREES = 1.0
+MOVING = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +39,19 @@ class Noise:
     correlation: float
     step_sigma: float
     rounding: float
+
+    @property
+    def moving(self) -> bool:
+        """Whether readings go much farther than they differ from one to the next: a signal, not noise."""
+        return self.sigma.value > MOVING * self.step_sigma > 0.0
+
+    @property
+    def reading_sigma(self) -> Estimate:
+        """σ of a reading as a filter needs it: `sigma`, or that of steps where slower motion is a signal."""
+        if not self.moving:
+            return self.sigma
+        wide = 1.96 * (0.75 / max(self.n - 1, 1)) ** 0.5  # neighbouring steps share a reading
+        return Estimate(self.step_sigma, self.step_sigma * (1.0 - wide), self.step_sigma * (1.0 + wide))
 
     @property
     def white(self) -> bool:

@@ -14,7 +14,8 @@ __all__ = ["Outliers", "outliers_of"]
 
 Array = NDArray[np.float64]
 WINDOW = 51
-THRESHOLD = 6.0  # σ of the window, which is uncertain by a tenth; one normal reading in 1e7 is flagged
+THRESHOLD = 6.0  # σ; less than one normal reading in a million is flagged
+QUIETEST = 0.9  # of the usual σ that a window's is taken to have at least
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,8 +57,12 @@ def outliers_of(t: Array, x: Array, lsb: float = 0.0) -> Outliers:
     """
     window = min(WINDOW, max(3, (len(x) // 2) | 1))
     seen = Hampel(window, threshold=THRESHOLD, floor=lsb).spread(x)
-    where = seen.outlier
-    n, k = int(np.isfinite(x).sum()), int(where.sum())
+    known = np.isfinite(x)
+    # 51 readings know their σ to a sixth only: where it came out small by chance, the usual one counts
+    usual = QUIETEST * float(np.median(seen.sigma[known])) if known.any() else 0.0
+    sigma = np.maximum(seen.sigma, usual)
+    where = np.asarray(known & (np.abs(x - seen.median) > THRESHOLD * sigma))
+    n, k = int(known.sum()), int(where.sum())
     far = np.abs(x - seen.median)[where]
     hours = float(t[-1] - t[0]) / 3600.0 if len(t) > 1 else 0.0
     return Outliers(
@@ -66,7 +71,7 @@ def outliers_of(t: Array, x: Array, lsb: float = 0.0) -> Outliers:
         k / hours if hours > 0.0 else 0.0,
         float(np.median(far)) if k else float("nan"),
         float(far.max()) if k else float("nan"),
-        float(np.median(far / np.maximum(seen.sigma[where], 1e-300))) if k else float("nan"),
+        float(np.median(far / np.maximum(sigma[where], 1e-300))) if k else float("nan"),
     )
 
 
