@@ -5,15 +5,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["level_at_rest", "quietest", "turning_ratio"]
+from sequential.manifold.quaternion import quaternion_exp, quaternion_inverse, quaternion_multiply, rotate
+
+__all__ = ["is_calm", "level_at_rest", "quietest", "right_factor", "too_far", "turning_errors"]
 
 Array = NDArray[np.float64]
-EXPLAINED = 0.3  # share of gravity's turning that the gyro must account for before it is believed
+CALM = 0.05  # spread of the quietest part over its level, up to which it counts as rest
+FEWEST, WINDOWS = 30, 300  # half seconds from which scales can be told apart, and as many as are used
+CLEAR = 0.75  # of the error without turning, below which a factor explains what is seen
+FAIR, LOST = 0.6, 1.4  # rad: a mean angle above the first explains nothing, above the second says nothing
 
 
 def level_at_rest(values: Array, rate: float) -> float:
     """Median length of a vector over the tenth of the recording in which it changes least."""
     return float(np.median(np.linalg.norm(values[quietest(values, rate)], axis=1)))
+
+
+def is_calm(values: Array, rate: float) -> bool:
+    """Whether the quietest tenth is as good as still: its spread is a twentieth of its length."""
+    calm = values[quietest(values, rate)]
+    width = max(int(0.5 * rate), 5) if np.isfinite(rate) else 5
+    blocks = [calm[k : k + width] for k in range(0, len(calm), width)]
+    spread = float(np.median([np.linalg.norm(block.std(axis=0)) for block in blocks]))
+    return spread < CALM * float(np.median(np.linalg.norm(calm, axis=1)))
 
 
 def quietest(values: Array, rate: float) -> NDArray[np.bool_]:
@@ -28,49 +42,61 @@ def quietest(values: Array, rate: float) -> NDArray[np.bool_]:
     return np.concatenate([np.repeat(calm, width), np.zeros(len(values) - count * width, dtype=bool)])
 
 
-def turning_ratio(gyro: Array, t: NDArray[np.int64], accel: Array) -> float | None:
-    """How much of the gyro's turning gravity shows, by least squares; None where little turns.
+def turning_errors(gyro: Array, t: NDArray[np.int64], accel: Array, factors: Array) -> Array | None:
+    """Mean angle by which the accelerometer's direction is missed after half a second, rad.
 
-    Gravity is fixed in the world, so its direction in the body follows du = -(∫ω dt) × u.  Means over tenths
-    of a second keep the body's own acceleration and the noise small beside it; the gyro's bias is its median
-    where the accelerometer rests.
+    For each factor (K,) that may bring the gyro to rad/s, and last for no turn at all, (K + 1,).  The half
+    seconds are those that turn more than most; the gyro's bias is its median where the accelerometer
+    rests.  None where there are too few.
     """
-    s = (t - t[0]) * 1e-9
-    if s[-1] < 1.0:
+    steps = np.diff(t) * 1e-9
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    count = max(round(0.5 / usual), 4) if usual > 0 else 0
+    if count == 0 or len(steps) < 5 * count:
         return None
-    steps = np.diff(s)
-    free = gyro - np.median(gyro[quietest(accel, 1.0 / float(np.median(steps)))], axis=0)
-    grid = np.arange(0.0, s[-1], 0.1)
-    up, length = _direction(np.diff(_integral(accel, s, grid), axis=0))
-    angle = _integral(free, s, grid)
-    turned = 0.5 * (angle[2:] - angle[:-2])  # from the middle of one tenth to the middle of the next
-    expected = -np.cross(turned, 0.5 * (up[1:] + up[:-1]))
-    seen = np.diff(up, axis=0)
-    fair = (np.abs(length / np.median(length) - 1.0) < 0.2) & _covered(s, steps, grid)
-    use = fair[1:] & fair[:-1] & (np.linalg.norm(seen, axis=1) < 0.5)
-    power, whole = float((expected[use] ** 2).sum()), float((seen[use] ** 2).sum())
-    if use.sum() < 10 or power == 0.0 or whole == 0.0:
+    free = 0.5 * (gyro[1:] + gyro[:-1])
+    if is_calm(accel, 1.0 / usual):
+        free = free - np.median(gyro[quietest(accel, 1.0 / usual)], axis=0)
+    starts = np.arange(0, len(steps) - count, max(count // 2, 1))
+    rows = starts[:, None] + np.arange(count)
+    whole = (steps[rows] < 3.0 * usual).all(axis=1)
+    edge = max(count // 20, 1)
+    first, before = _direction(accel[rows[:, :edge]].mean(axis=1))
+    last, after = _direction(accel[rows[:, count - edge :]].mean(axis=1))
+    typical = np.median(np.linalg.norm(accel, axis=1))
+    fair = whole & (np.abs(before / typical - 1.0) < 0.3) & (np.abs(after / typical - 1.0) < 0.3)
+    chosen = np.flatnonzero(fair if fair.sum() >= 0.3 * whole.sum() else whole)
+    if len(chosen) < FEWEST:
         return None
-    ratio = float((expected[use] * seen[use]).sum() / power)
-    explained = 1.0 - float(((seen[use] - ratio * expected[use]) ** 2).sum()) / whole
-    return ratio if explained > EXPLAINED else None
+    turned = np.linalg.norm((free[rows[chosen]] * steps[rows[chosen]][:, :, None]).sum(axis=1), axis=1)
+    chosen = chosen[turned >= np.quantile(turned, 0.6)]
+    chosen = chosen[:: max(len(chosen) // WINDOWS, 1)]
+    scales = np.append(factors, 0.0)[:, None, None]
+    q = np.zeros((len(scales), len(chosen), 4))
+    q[..., 0] = 1.0
+    for k in range((edge - 1) // 2, count - 1 - (edge - 1) // 2):
+        row = rows[chosen, k]
+        q = quaternion_multiply(q, quaternion_exp(scales * (free[row] * steps[row][:, None])))
+    seen = rotate(quaternion_inverse(q), np.broadcast_to(first[chosen], (*q.shape[:2], 3)))
+    cosine = np.clip(np.einsum("kmi,mi->km", seen, last[chosen]), -1.0, 1.0)
+    return np.asarray(np.arccos(cosine).mean(axis=1))
 
 
-def _integral(values: Array, s: Array, grid: Array) -> Array:
-    """(M, 3) integral of a vector from the beginning to the moments of a grid."""
-    parts = 0.5 * (values[1:] + values[:-1]) * np.diff(s)[:, None]
-    total = np.vstack([np.zeros(3), np.cumsum(parts, axis=0)])
-    return np.stack([np.interp(grid, s, total[:, k]) for k in range(3)], axis=1)
+def right_factor(errors: Array | None) -> int | None:
+    """Index of the factor that turns gravity clearly better than the others and than none, or None."""
+    if errors is None or errors[-1] > LOST:
+        return None
+    best = int(np.argmin(errors[:-1]))
+    others = np.delete(errors[:-1], best)
+    clear = errors[best] < min(CLEAR * errors[-1], FAIR) and bool((errors[best] < CLEAR * others).all())
+    return best if clear else None
+
+
+def too_far(errors: Array | None, index: int = 0) -> bool:
+    """Whether a factor makes the gyro turn where the accelerometer sees that nothing of the kind happens."""
+    return errors is not None and errors[-1] < FAIR and bool(errors[index] > 1.5 * errors[-1] + 0.1)
 
 
 def _direction(vectors: Array) -> tuple[Array, Array]:
     length = np.linalg.norm(vectors, axis=1)
     return vectors / np.maximum(length, 1e-12)[:, None], length
-
-
-def _covered(s: Array, steps: Array, grid: Array) -> NDArray[np.bool_]:
-    """(M-1,) tenths of a second into which no pause of the recording reaches."""
-    whole = np.ones(len(grid) - 1, dtype=bool)
-    for k in np.flatnonzero(steps > 0.1):
-        whole[max(int(s[k] / 0.1), 0) : int(s[k + 1] / 0.1) + 1] = False
-    return whole

@@ -7,14 +7,20 @@ from numpy.typing import NDArray
 
 from sequential.readers.imu.units import Scale, scale_of
 from sequential.sensors.finding import Finding
-from sequential.sensors.turning import level_at_rest, turning_ratio
+from sequential.sensors.turning import level_at_rest, right_factor, too_far, turning_errors
 
 __all__ = ["FREE_FALL", "guess_accel", "guess_gyro", "guess_mag"]
 
 Array = NDArray[np.float64]
 SENSITIVITIES = (16384.0, 8192.0, 4096.0, 2048.0)  # counts in one g, ±2 to ±16 g in 16 bits
+DEG = np.pi / 180.0
 GYRO_SENSITIVITIES = (131.0, 65.5, 32.8, 16.4)  # counts in one deg/s, ±250 to ±2000 deg/s
-ACCEL_BANDS = (("g", 0.8, 1.25), ("m/s^2", 7.8, 12.2), ("mg", 800.0, 1250.0))
+# name, what rest shows, and what motion may make of it
+ACCEL_BANDS = (
+    ("g", 0.8, 1.25, 0.3, 3.1),
+    ("m/s^2", 7.8, 12.2, 3.1, 31.0),
+    ("mg", 800.0, 1250.0, 310.0, 3100.0),
+)
 MAG_BANDS = (("G", 0.2, 0.75), ("uT", 18.0, 75.0), ("mG", 180.0, 750.0), ("nT", 18_000.0, 75_000.0))
 FREE_FALL = 0.3  # of g: an accelerometer at rest that shows less has had gravity taken away
 
@@ -22,10 +28,14 @@ FREE_FALL = 0.3  # of g: an accelerometer at rest that shows less has had gravit
 def guess_accel(accel: Array, rate: float) -> tuple[Scale | None, Finding]:
     """The unit of an accelerometer by its length at rest; None where it is no unit that is known."""
     level = level_at_rest(accel, rate)
-    for name, low, high in ACCEL_BANDS:
+    whole = _whole(accel)
+    for name, low, high, least, most in ACCEL_BANDS:
         if low <= level <= high:
             return _told("accel", name, level)
-    if _whole(accel):
+        if least <= level <= most and not whole:
+            what = f"the accel has no unit and is taken as {name}: it shows {level:.4g} where it moves least"
+            return scale_of("accel", name), Finding("warn", what, do="give units accel=… if that is wrong")
+    if whole:
         for counts in SENSITIVITIES:
             if abs(level / counts - 1.0) < 0.2:
                 return _told("accel", f"{counts:g} LSB/g", level)
@@ -48,12 +58,15 @@ def guess_gyro(
     Where nothing turns, its size decides, and the finding is a warning.
     """
     said = accel_unit.name if accel_unit is not None else ""
-    ratio = None if accel is None else turning_ratio(gyro, t, accel)
     if _whole(gyro) and (said.endswith("LSB/g") or accel is None or said == "counts"):
-        return _counts(said, ratio)
-    for unit, turned in (("rad/s", ratio), ("deg/s", None if ratio is None else ratio * 180.0 / np.pi)):
-        if turned is not None and 0.2 < turned < 5.0:
-            return _gyro(unit, f"it turns gravity as the accelerometer does ({turned:.2f} of it)")
+        factors = np.array([DEG / counts for counts in GYRO_SENSITIVITIES])
+        return _counts(said, right_factor(_errors(gyro, t, accel, factors)))
+    errors = _errors(gyro, t, accel, np.array([1.0, DEG]))
+    turns = right_factor(errors)
+    if turns is not None:
+        return _gyro(("rad/s", "deg/s")[turns], "so it turns gravity as the accelerometer shows")
+    if too_far(errors):
+        return _gyro("deg/s", "in rad/s it would turn where the accelerometer does not")
     largest = float(np.abs(gyro).max(initial=0.0))
     quiet = float(np.median(np.abs(np.diff(gyro, axis=0)))) if len(gyro) > 1 else 0.0
     unit = "deg/s" if largest > 40.0 or quiet > 0.02 else "rad/s"
@@ -61,18 +74,16 @@ def guess_gyro(
     return _gyro(unit, why, sure=largest > 40.0)
 
 
-def _counts(accel_unit: str, ratio: float | None) -> tuple[Scale | None, Finding]:
+def _errors(gyro: Array, t: NDArray[np.int64], accel: Array | None, factors: Array) -> Array | None:
+    return None if accel is None else turning_errors(gyro, t, accel, factors)
+
+
+def _counts(accel_unit: str, turns: int | None) -> tuple[Scale | None, Finding]:
     """The sensitivity of a gyro of whole numbers: the one that turns gravity rightly, or the usual one."""
-    if ratio is not None and ratio > 0:
-        seen = np.pi / 180.0 / ratio
-        near = min(GYRO_SENSITIVITIES, key=lambda counts: abs(np.log(counts / seen)))
-        if abs(np.log(near / seen)) < 0.3:
-            what = (
-                f"the gyro has no unit and is taken as {near:g} LSB/(deg/s): it turns gravity at {seen:.3g}"
-            )
-            return scale_of("gyro", f"{near:g} LSB/dps"), Finding(
-                "note", what, do="give units gyro=… if wrong"
-            )
+    if turns is not None:
+        counts = GYRO_SENSITIVITIES[turns]
+        what = f"the gyro has no unit and is taken as {counts:g} LSB/(deg/s): so it turns gravity rightly"
+        return scale_of("gyro", f"{counts:g} LSB/dps"), Finding("note", what, do="give units gyro=… if wrong")
     if accel_unit != "16384 LSB/g":
         what = "the gyro holds whole numbers and no unit, and is taken as counts"
         return None, Finding("warn", what, do="give units gyro='131 LSB/dps' or the like")

@@ -46,7 +46,7 @@ def _names_labels(cells: Sequence[str]) -> bool:
 def _order(table: TextTable, names: list[str]) -> Rows:
     column = next((names.index(name) for name in SAMPLES if name in names), None)
     if column is None:
-        return np.arange(len(table.rows))
+        return np.arange(len(table))
     return np.argsort(table.numbers([column])[:, 0], kind="stable")
 
 

@@ -8,13 +8,37 @@ from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY
 from sequential.sensors.health.clock import FEWEST
 from sequential.sensors.recording import SI, ImuRecording
-from sequential.sensors.turning import level_at_rest, quietest, turning_ratio
+from sequential.sensors.turning import is_calm, level_at_rest, quietest, right_factor, too_far, turning_errors
 
 __all__ = ["scale_findings"]
 
 DEG = np.pi / 180.0
 FASTEST = 70.0  # rad/s: 4000 deg/s, the largest range that is sold
+DEGREES = "it is in deg/s: read it with units gyro=deg/s"
 RESTING = 0.6  # rad/s: 35 deg/s, more than any bias
+
+
+def _times(factor: float) -> Finding:
+    what = f"gravity turns {factor:g} times as far as the gyro does"
+    return Finding("warn", what, do="check the range that the gyro was set to, and that its axes agree")
+
+
+# What brings the gyro to rad/s, and what to say where that factor turns gravity rightly and 1 does not.
+FACTORS = {
+    1.0: None,
+    DEG: Finding("fail", "the gyro turns 57 times as far as gravity does", do=DEGREES),
+    1.0 / DEG: Finding(
+        "fail",
+        "gravity turns 57 times as far as the gyro does",
+        do="its unit was taken as deg/s and is rad/s: read it with units gyro=rad/s",
+    ),
+    -1.0: Finding(
+        "fail",
+        "the gyro turns gravity the wrong way",
+        do="the axes or signs of gyro and accelerometer disagree; turn one of them round",
+    ),
+    **{factor: _times(factor) for factor in (0.25, 0.5, 2.0, 4.0)},
+}
 
 
 def scale_findings(recording: ImuRecording) -> list[Finding]:
@@ -23,7 +47,8 @@ def scale_findings(recording: ImuRecording) -> list[Finding]:
         return []
     found = []
     if recording.accel is not None and recording.accel_unit == SI["accel"]:
-        found += _gravity(level_at_rest(recording.accel, recording.rate))
+        level = level_at_rest(recording.accel, recording.rate)
+        found += _gravity(level) if is_calm(recording.accel, recording.rate) else _in_motion(level)
     if recording.gyro is not None and recording.gyro_unit == SI["gyro"]:
         found += _gyro(recording)
     return found
@@ -50,38 +75,31 @@ def _gravity(level: float) -> list[Finding]:
     return []
 
 
+def _in_motion(level: float) -> list[Finding]:
+    """An accelerometer that never rests shows g within a factor of three."""
+    said = f"the accelerometer shows {level:.3g} where it moves least, far from 9.81 m/s²"
+    if level < 0.3 * STANDARD_GRAVITY:
+        return [Finding("fail", said, do="it is in g, or gravity was taken away; read it with units accel=g")]
+    if level > 3.2 * STANDARD_GRAVITY:
+        return [Finding("fail", said, do="state its unit with units accel=…")]
+    return []
+
+
 def _gyro(recording: ImuRecording) -> list[Finding]:
     gyro, accel = recording.gyro, recording.accel
     assert gyro is not None  # noqa: S101 - the caller has looked
+    errors = None if accel is None else turning_errors(gyro, recording.t, accel, np.array(list(FACTORS)))
+    right = right_factor(errors)
+    if right is not None:
+        return [finding] if (finding := list(FACTORS.values())[right]) is not None else []
     largest = float(np.abs(gyro).max())
-    ratio = None if accel is None else turning_ratio(gyro, recording.t, accel)
-    degrees = "it is in deg/s: read it with units gyro=deg/s"
-    if ratio is not None and 0.3 < ratio / DEG < 3.0:
-        return [Finding("fail", f"the gyro turns {1 / ratio:.0f} times as far as gravity does", do=degrees)]
     if largest > FASTEST:
-        return [Finding("fail", f"the gyro reaches {largest:.0f} rad/s, which no gyro measures", do=degrees)]
+        return [Finding("fail", f"the gyro reaches {largest:.0f} rad/s, which no gyro measures", do=DEGREES)]
+    if too_far(errors):
+        return [Finding("fail", "the gyro turns where the accelerometer shows that nothing does", do=DEGREES)]
     calm = quietest(gyro, recording.rate)
     resting = float(np.median(np.linalg.norm(gyro[calm], axis=1)))
-    if (
-        accel is not None
-        and resting > RESTING
-        and ratio is None
-        and float(accel[calm].std(axis=0).max()) < 0.2
-    ):
+    if accel is not None and resting > RESTING and float(accel[calm].std(axis=0).max()) < 0.2:
         what = f"the gyro shows {resting:.2f} rad/s while the accelerometer rests"
-        return [Finding("fail", what, do=f"{degrees}, or remove its bias (factorlab calibrate gyro)")]
-    return [] if ratio is None else _turning(ratio)
-
-
-def _turning(ratio: float) -> list[Finding]:
-    """A gyro that is neither in degrees nor right."""
-    if 30.0 < ratio < 120.0:
-        do = "its unit was taken as deg/s and is rad/s: read it with units gyro=rad/s"
-        return [Finding("fail", f"gravity turns {ratio:.0f} times as far as the gyro does", do=do)]
-    if ratio < -0.3:
-        what = f"the gyro turns gravity the wrong way ({ratio:.2f} of what the accelerometer shows)"
-        return [Finding("fail", what, do="the axes or signs of the two disagree; turn one of them round")]
-    if not 0.5 < ratio < 2.0:
-        what = f"gravity turns {ratio:.2f} times as far as the gyro does"
-        return [Finding("warn", what, do="check the range that the gyro was set to, and that axes agree")]
+        return [Finding("fail", what, do=f"{DEGREES}, or remove its bias (factorlab calibrate gyro)")]
     return []
