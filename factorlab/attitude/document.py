@@ -15,7 +15,8 @@ __all__ = ["attitude_document"]
 
 HONEST, PLAUSIBLE = (0.90, 0.98), (0.85, 0.99)
 LARGE_BIAS = 1.0  # °/s
-MUCH = 0.25
+MUCH = 0.25  # of the time
+STEEP = 70.0  # °
 
 
 def attitude_document(
@@ -70,6 +71,8 @@ def _verdicts(recording: ImuRecording, first: Solved) -> list[Verdict]:
         found.append(Verdict("error against the truth", total, None, "INFO", meaning, unit="°"))
     if first.share is not None:
         found.append(_honesty(first.share))
+    if first.name == "kalman":
+        found += _steepness(float(np.degrees(np.abs(history.roll_pitch_yaw()[:, 1]).max())))
     if (sigmas := history.roll_pitch_yaw_sigmas()) is not None:
         tilt, yaw = np.degrees(np.median(sigmas[:, :2])), np.degrees(np.median(sigmas[:, 2]))
         said = f"median σ of roll and pitch; of yaw {yaw:.2f}°"
@@ -102,6 +105,16 @@ def _honesty(share: float) -> Verdict:
     meaning = "the declared covariance is too small" if small else "the declared covariance is too large"
     action = "calibrate the sensors, or declare more noise" if small else "declare less noise"
     return Verdict("errors inside the 95 % ellipsoid", 100 * share, None, status, meaning, action, "%")
+
+
+def _steepness(pitch: float) -> list[Verdict]:
+    """Whether the pitch came near to where a filter of angles loses roll and yaw."""
+    if pitch < STEEP:
+        return []
+    meaning = "roll and yaw exchange their parts near 90°: errors of tens of degrees"
+    return [
+        Verdict("largest pitch", pitch, None, "WARN", meaning, "use --filter mahony or error-state", unit="°")
+    ]
 
 
 def _bias(bias: Any) -> Verdict:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sequential.errors import ShapeError
 from sequential.log import frozen, nanoseconds, seconds
 
-__all__ = ["AttitudeHistory"]
+__all__ = ["AttitudeHistory", "read_only"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -46,6 +46,8 @@ class AttitudeHistory:
     magnetic_disturbance : (N,) where it did not trust the magnetometer
     name : of the estimator
 
+    Arrays are copied, unless they are read-only already (see `read_only`).
+
     Raises
     ------
     ShapeError
@@ -64,8 +66,10 @@ class AttitudeHistory:
     name: str = "attitude"
 
     def __post_init__(self) -> None:
-        t = nanoseconds(self.t).copy()
-        t.flags.writeable = False
+        t = np.asarray(self.t)
+        if t.dtype != np.int64 or t.flags.writeable:
+            t = nanoseconds(t).copy()
+            t.flags.writeable = False
         object.__setattr__(self, "t", t)
         for field in fields(self):
             given = getattr(self, field.name)
@@ -79,6 +83,8 @@ class AttitudeHistory:
             raise ShapeError(
                 f"AttitudeHistory.{name} has shape {shape} for {len(self.t)} stamps, got {np.shape(given)}"
             )
+        if isinstance(given, np.ndarray) and _is_sealed(given, np.float64 if SHAPES[name] else np.bool_):
+            return given
         if not SHAPES[name]:
             flags = np.array(given, dtype=np.bool_)
             flags.flags.writeable = False
@@ -108,3 +114,14 @@ class AttitudeHistory:
         rates = euler_rates(self.roll_pitch_yaw())
         variances: Array = np.einsum("nij,njk,nik->ni", rates, self.cov, rates)
         return np.sqrt(variances)
+
+
+def read_only(*arrays: Array | Flags | None) -> None:
+    """Seal arrays that nobody else holds, so that a history takes them without a copy."""
+    for array in arrays:
+        if array is not None:
+            array.flags.writeable = False
+
+
+def _is_sealed(array: NDArray[np.generic], kind: type[np.generic]) -> bool:
+    return array.dtype == kind and array.flags.c_contiguous and not array.flags.writeable

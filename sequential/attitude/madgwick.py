@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.attitude.estimator import AttitudeFilter, own_state, require_settings, sample
-from sequential.attitude.history import AttitudeHistory
+from sequential.attitude.history import AttitudeHistory, read_only
 from sequential.errors import ModelError
 from sequential.sensors.recording import ImuRecording
 
@@ -104,4 +104,5 @@ class Madgwick(AttitudeFilter):
         gyro, accel, mag = self.samples(recording)
         quaternions = np.empty((len(recording), 4))
         run_madgwick(recording.t, gyro, accel, mag, self.settings, np.zeros(STATE), quaternions)
+        read_only(quaternions)
         return AttitudeHistory(recording.t, quaternions, name=self.name)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.attitude.estimator import AttitudeFilter, own_state, require_settings, sample
-from sequential.attitude.history import AttitudeHistory
+from sequential.attitude.history import AttitudeHistory, read_only
 from sequential.errors import ModelError
 from sequential.sensors.recording import ImuRecording
 
@@ -153,6 +153,7 @@ class Mahony(AttitudeFilter):
         count = len(recording)
         quaternions, bias, seen = np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 2))
         run_mahony(recording.t, gyro, accel, mag, self.settings, np.zeros(STATE), quaternions, bias, seen)
+        read_only(quaternions, bias)
         return AttitudeHistory(
             recording.t,
             quaternions,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sequential.attitude.angles import attitude_from_angles, body_rates, tilt
+from sequential.attitude.angles import tilt
 from sequential.attitude.estimator import AttitudeFilter, own_state, require_settings, sample
-from sequential.attitude.history import AttitudeHistory
+from sequential.attitude.history import AttitudeHistory, read_only
 from sequential.errors import DataError, ModelError
 from sequential.log import SensorLog, Stream
 from sequential.sensors.recording import ImuRecording
@@ -118,15 +118,20 @@ class TiltKalman(AttitudeFilter):
 
     def estimate(self, recording: ImuRecording) -> AttitudeHistory:
         """Orientation with covariance and biases at every sample of a recording."""
+        from sequential.attitude.tilt_kernel import in_body
+
         states = self.path(recording)
-        angles = states[:, :3]
-        body = body_rates(angles)
+        count = len(states)
+        quaternions, bias = np.empty((count, 4)), np.empty((count, 3))
+        cov, bias_cov = np.empty((count, 3, 3)), np.empty((count, 3, 3))
+        in_body(states, np.empty(5), quaternions, cov, bias, bias_cov)
+        read_only(quaternions, cov, bias, bias_cov)
         return AttitudeHistory(
             recording.t,
-            attitude_from_angles(angles),
-            cov=_turned(body, states[:, 6:9]),
-            gyro_bias=np.einsum("nij,nj->ni", body, states[:, 3:6]),
-            gyro_bias_cov=_turned(body, states[:, 12:15]),
+            quaternions,
+            cov=cov,
+            gyro_bias=bias,
+            gyro_bias_cov=bias_cov,
             name=self.name,
         )
 
@@ -184,9 +189,3 @@ class TiltKalman(AttitudeFilter):
     def _require(self, channel: str) -> None:
         if channel not in CHANNELS:
             raise ModelError(f"a channel is 'roll' or 'pitch', got {channel!r}")
-
-
-def _turned(body: Array, variances: Array) -> Array:
-    """Covariances (N, 3, 3) in the body frame of independent channels (N, 3)."""
-    cov: Array = np.einsum("nij,nj,nkj->nik", body, variances, body)
-    return cov

@@ -16,9 +16,9 @@ import math
 
 from numba import njit, types
 
-from sequential.attitude.turning_kernel import compiled, f0, f1, f2, i1, usable, w1, w2
+from sequential.attitude.turning_kernel import compiled, f0, f1, f2, i1, usable, w1, w2, w3
 
-__all__ = ["STATE", "run_tilt", "start_tilt", "step_tilt"]
+__all__ = ["STATE", "in_body", "run_tilt", "start_tilt", "step_tilt"]
 
 STATE = 19
 PAUSE = 1.0  # s: nothing is integrated over a longer one
@@ -120,3 +120,35 @@ def run_tilt(t, gyro, accel, mag, p, s, path):
         step_tilt(s, gyro[k], accel[k], mag[min(k, last)], dt, p)
         for i in range(STATE):
             path[k, i] = s[i]
+
+
+@njit(types.void(f1, f1, w2), **compiled)
+def turned(variances, e, out):
+    """E diag(variances) Eᵀ for E = [[1, 0, e0], [0, e1, e2], [0, -e3, e4]], rates of angles to body rates."""
+    u, v, w = variances[0], variances[1], variances[2]
+    out[0, 0] = u + e[0] * e[0] * w
+    out[1, 1] = e[1] * e[1] * v + e[2] * e[2] * w
+    out[2, 2] = e[3] * e[3] * v + e[4] * e[4] * w
+    out[0, 1] = out[1, 0] = e[0] * e[2] * w
+    out[0, 2] = out[2, 0] = e[0] * e[4] * w
+    out[1, 2] = out[2, 1] = e[2] * e[4] * w - e[1] * e[3] * v
+
+
+@njit(types.void(f2, w1, w2, w3, w2, w3), **compiled)
+def in_body(path, e, q, cov, bias, bias_cov):
+    """Quaternions, and covariances and biases about the body's axes, of states (N, 19); e is scratch (5,)."""
+    for k in range(len(path)):
+        s = path[k]
+        cr, sr = math.cos(0.5 * s[0]), math.sin(0.5 * s[0])
+        cp, sp = math.cos(0.5 * s[1]), math.sin(0.5 * s[1])
+        cy, sy = math.cos(0.5 * s[2]), math.sin(0.5 * s[2])
+        q[k, 0], q[k, 1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+        q[k, 2], q[k, 3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+        sine, cosine = 2.0 * sr * cr, cr * cr - sr * sr
+        steep, level = 2.0 * sp * cp, cp * cp - sp * sp
+        e[0], e[1], e[2], e[3], e[4] = -steep, cosine, sine * level, sine, cosine * level
+        turned(s[6:9], e, cov[k])
+        turned(s[12:15], e, bias_cov[k])
+        bias[k, 0] = s[3] + e[0] * s[5]
+        bias[k, 1] = e[1] * s[4] + e[2] * s[5]
+        bias[k, 2] = e[4] * s[5] - e[3] * s[4]

@@ -67,6 +67,21 @@ def test_a_history_is_sealed_and_gives_angles_with_sigmas(rng):
     assert AttitudeHistory(history.t, history.world_q_body).roll_pitch_yaw_sigmas() is None
 
 
+def test_only_what_is_read_only_already_is_not_copied():
+    t, q = np.arange(3), attitude_from_angles(np.zeros((3, 3)))
+    copied = AttitudeHistory(t, q)
+    q[:] = 0.5
+    t[:] = 7
+    np.testing.assert_array_equal(copied.world_q_body[:, 0], 1.0)
+    np.testing.assert_array_equal(copied.t, [0, 1, 2])
+    q.flags.writeable = False
+    assert AttitudeHistory(copied.t, q).world_q_body is q
+    assert AttitudeHistory(copied.t, q[:, :]).t is copied.t
+    turned = np.asfortranarray(q)
+    turned.flags.writeable = False
+    assert AttitudeHistory(copied.t, turned).world_q_body.flags.c_contiguous
+
+
 def test_sigmas_are_those_of_a_sample(rng):
     one = np.array([0.4, -0.7, 2.0])
     root = 1e-3 * rng.normal(size=(3, 3))

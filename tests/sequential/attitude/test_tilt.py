@@ -7,7 +7,14 @@ import pytest
 from attitude_worlds import RATE, seen, still, swinging
 
 import sequential as sq
-from sequential.attitude import ComplementaryAttitude, Mahony, TiltKalman, attitude_from_angles, tilt
+from sequential.attitude import (
+    ComplementaryAttitude,
+    Mahony,
+    TiltKalman,
+    attitude_from_angles,
+    body_rates,
+    tilt,
+)
 from sequential.errors import DataError, MissingStreamError, ModelError, ShapeError
 from sequential.evaluate import attitude_nees
 from sequential.sensors import ImuRecording
@@ -60,6 +67,23 @@ def test_angles_and_biases_are_found_with_honest_sigmas(rng):
     assert np.mean(error < 2 * sigmas[1000:, :2]) > 0.75
     assert np.isfinite(attitude_nees(found.world_q_body, found.cov, truth)).all()
     assert np.all(np.diff(sigmas[1000:, 2]) > 0)  # nothing corrects yaw
+
+
+def test_what_is_told_about_the_body_is_told_about_the_angles(rng):
+    """Compiled, against the matrices of `body_rates` on angles of every kind."""
+    t, angles = swinging(8.0)
+    filt = TiltKalman()
+    for shift in ([0.0, 0.0, 0.0], [2.5, 0.6, -2.0]):
+        recording = seen(t, attitude_from_angles(angles + np.array(shift)), rng=rng)
+        found, states = filt.estimate(recording), filt.path(recording)
+        body = body_rates(states[:, :3])
+        np.testing.assert_allclose(
+            np.abs(np.sum(found.world_q_body * attitude_from_angles(states[:, :3]), 1)), 1
+        )
+        for cov, at in ((found.cov, 6), (found.gyro_bias_cov, 12)):
+            expected = np.einsum("nij,nj,nkj->nik", body, states[:, at : at + 3], body)
+            np.testing.assert_allclose(cov, expected, rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(found.gyro_bias, np.einsum("nij,nj->ni", body, states[:, 3:6]), atol=1e-12)
 
 
 def test_about_one_axis_the_complementary_filter_is_the_textbook_s(rng):
