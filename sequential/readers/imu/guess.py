@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sequential.readers.imu.units import Scale, scale_of
 from sequential.sensors.finding import Finding
-from sequential.sensors.turning import level_at_rest, right_factor, too_far, turning_errors
+from sequential.sensors.turning import level_at_rest, quietest, right_factor, too_far, turning_errors
 
 __all__ = ["FREE_FALL", "guess_accel", "guess_gyro", "guess_mag"]
 
@@ -68,8 +68,10 @@ def guess_gyro(
     if too_far(errors):
         return _gyro("deg/s", "in rad/s it would turn where the accelerometer does not")
     largest = float(np.abs(gyro).max(initial=0.0))
-    quiet = float(np.median(np.abs(np.diff(gyro, axis=0)))) if len(gyro) > 1 else 0.0
-    unit = "deg/s" if largest > 40.0 or quiet > 0.02 else "rad/s"
+    rate = 1e9 / float(np.median(np.diff(t))) if len(t) > 1 else float("nan")
+    steps = np.abs(np.diff(gyro, axis=0))[quietest(gyro, rate)[1:]]
+    quiet = float(np.median(steps)) if steps.size else 0.0
+    unit = "deg/s" if largest > 40.0 or (quiet > 0.02 and largest < 5.0) else "rad/s"
     why = f"by its size alone (largest {largest:.3g}, usual step {quiet:.2g})"
     return _gyro(unit, why, sure=largest > 40.0)
 
