@@ -86,11 +86,12 @@ def step_complementary(s, w, a, m, dt, p):
 
 @njit(types.void(i1, f2, f2, f2, f1, w1, w2), **compiled)
 def run_complementary(t, gyro, accel, mag, p, s, q):
-    """Fill q (N, 4); s is the state, `mag` may have one row, of NaN."""
+    """Fill q (N, 4), w >= 0; s is the state, `mag` may have one row, of NaN."""
     start_complementary(s, accel[0])
     last = len(mag) - 1
     for k in range(len(t)):
         dt = (t[k] - t[k - 1]) * 1e-9 if k > 0 else 0.0
         step_complementary(s, gyro[k], accel[k], mag[min(k, last)], dt, p)
+        sign = math.copysign(1.0, s[0])
         for i in range(4):
-            q[k, i] = s[i]
+            q[k, i] = sign * s[i]

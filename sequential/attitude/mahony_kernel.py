@@ -160,8 +160,9 @@ def run_mahony(t, gyro, accel, mag, p, s, q, bias, seen):
     for k in range(len(t)):
         dt = (t[k] - t[k - 1]) * 1e-9 if k > 0 else 0.0
         step_mahony(s, gyro[k], accel[k], mag[min(k, last)], dt, p)
+        sign = math.copysign(1.0, s[0])
         for i in range(4):
-            q[k, i] = s[i]
+            q[k, i] = sign * s[i]
         for i in range(3):
             bias[k, i] = s[4 + i]
         seen[k, 0], seen[k, 1] = s[16], s[9]

@@ -144,6 +144,9 @@ def in_body(path, e, q, cov, bias, bias_cov):
         cy, sy = math.cos(0.5 * s[2]), math.sin(0.5 * s[2])
         q[k, 0], q[k, 1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
         q[k, 2], q[k, 3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+        if q[k, 0] < 0.0:
+            for i in range(4):
+                q[k, i] = -q[k, i]
         sine, cosine = 2.0 * sr * cr, cr * cr - sr * sr
         steep, level = 2.0 * sp * cp, cp * cp - sp * sp
         e[0], e[1], e[2], e[3], e[4] = -steep, cosine, sine * level, sine, cosine * level
