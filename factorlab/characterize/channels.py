@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -21,6 +22,8 @@ __all__ = ["Channel", "channels_of", "read_columns"]
 Array = NDArray[np.float64]
 AXES = {"accel": ("ax", "ay", "az"), "gyro": ("gx", "gy", "gz"), "mag": ("mx", "my", "mz")}
 WRITTEN = {"m/s^2": "m/s²", "uT": "µT"}  # units as people write them
+HELD = 0.3  # share of repeated rows from which a sensor is slower than the recording
+HEADED = re.compile(r"(.+?)\s*[\[(]([^\])]*)[\])]")  # name [unit], name (unit)
 TIMES = ("t", "time", "timestamp", "seconds", "t_ns", "time_s", "seconds_elapsed", "temps", "date")
 
 
@@ -43,12 +46,20 @@ def channels_of(recording: ImuRecording) -> tuple[Channel, ...]:
         values = np.asarray(getattr(recording, sensor))
         unit = str(getattr(recording, f"{sensor}_unit"))
         known = np.isfinite(values).all(axis=1)
+        if sensor == "mag":
+            known &= _new(values)
         heat = None if recording.temperature is None else recording.temperature[known]
         found += [
             Channel(name, sensor, WRITTEN.get(unit, unit), recording.t[known], values[known, k], heat)
             for k, name in enumerate(AXES[sensor])
         ]
     return tuple(found)
+
+
+def _new(values: Array) -> NDArray[np.bool_]:
+    """Rows of a magnetometer that hold a new sample, where a slower one is repeated until the next."""
+    same = np.concatenate([[False], (np.diff(values, axis=0) == 0.0).all(axis=1)])
+    return ~same if float(same.mean()) > HELD else np.ones(len(values), dtype=bool)
 
 
 def read_columns(
@@ -73,25 +84,42 @@ def read_columns(
     DataError, FileFormatError
     """
     wanted = [*columns, *([] if temperature is None else [temperature])]
-    table = read_table(path, lambda cells: sum(name in cells for name in wanted) > 0)
-    for name in wanted:
-        if name not in table.header:
-            near = get_close_matches(name, table.header, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            has = ", ".join(table.header) or "no header"
-            raise DataError(f"{path} has no column {name!r}; it has {has}{hint}")
+    table = read_table(path, lambda cells: any(_place(cells, name) is not None for name in wanted))
     t, rows, said = _times(path, table, rate, time_unit)
-    heat = None
-    if temperature is not None:
-        heat = table.numbers([table.header.index(temperature)])[rows, 0]
+    heat = None if temperature is None else table.numbers([_found(path, table, temperature)])[rows, 0]
     found = []
     for name, unit in columns.items():
-        values = table.numbers([table.header.index(name)])[rows, 0]
+        column = _found(path, table, name)
+        values = table.numbers([column])[rows, 0]
         known = np.isfinite(values)
-        found.append(
-            Channel(name, name, unit, t[known], values[known], None if heat is None else heat[known])
-        )
+        own = None if heat is None else heat[known]
+        title, stated = _parts(table.header[column])
+        found.append(Channel(title, title, unit or stated, t[known], values[known], own))
     return tuple(found), said
+
+
+def _parts(cell: str) -> tuple[str, str]:
+    """Name and unit of a column headed `gx [rad/s]` or `T (°C)`."""
+    parts = HEADED.fullmatch(cell.strip())
+    return (parts[1], parts[2]) if parts else (cell.strip(), "")
+
+
+def _place(header: Sequence[str], name: str) -> int | None:
+    """Index of the column of this name, written with its unit or without."""
+    for cells in (list(header), [_parts(cell)[0] for cell in header]):
+        if name in cells:
+            return cells.index(name)
+    return None
+
+
+def _found(path: Path, table: TextTable, name: str) -> int:
+    place = _place(table.header, name)
+    if place is None:
+        names = [_parts(cell)[0] for cell in table.header]
+        near = get_close_matches(name, names, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise DataError(f"{path} has no column {name!r}; it has {', '.join(names) or 'no header'}{hint}")
+    return place
 
 
 def _times(
@@ -99,15 +127,16 @@ def _times(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[Finding, ...]]:
     """Stamps, the rows that they belong to, and what was noticed."""
     if rate is not None:
-        return evenly(len(table.rows), rate), np.arange(len(table.rows)), ()
-    name = next((h for h in table.header if h.strip().lower().split("(")[0].strip() in TIMES), None)
-    if name is None:
+        return evenly(len(table), rate), np.arange(len(table)), ()
+    place = next((k for k, cell in enumerate(table.header) if _parts(cell)[0].lower() in TIMES), None)
+    if place is None:
         raise FileFormatError(
             f"{path} has no time column ({', '.join(TIMES[:4])} …), its columns are "
             f"{', '.join(table.header)}; give the rate of the readings with --rate HZ"
         )
-    unit = parse_units({"t": time_unit} if time_unit else None).get("t")
-    stamps, said = stamps_of(table.text(table.header.index(name)), unit, str(path))
+    stated = time_unit or _parts(table.header[place])[1]
+    unit = parse_units({"t": stated} if stated else None).get("t")
+    stamps, said = stamps_of(table.text(place), unit, str(path))
     rows = np.flatnonzero(stamps != NO_STAMP)
     kept, more = ordered(stamps[rows], str(path))
     return stamps[rows][kept], rows[kept], (*said, *more)

@@ -24,6 +24,7 @@ from sequential.sensors import (
 
 __all__ = ["Study", "still_part", "study"]
 
+MARGIN = 0.5  # s
 WHOLE = 0.98  # of a recording: a dwell longer than this is all of it
 Window = tuple[float, float]
 
@@ -144,11 +145,15 @@ def still_part(recording: ImuRecording) -> Window | None:
             f"recording {recording.name!r} is never still for a second; noise, bias and Allan deviation need "
             "a sensor at rest: put it down, or name the part with --still START:STOP (s)"
         )
-    rows = max(dwells, key=len)
+    quiet = [run for rows in dwells for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)]
+    rows = max(quiet, key=len)
     if len(rows) >= WHOLE * len(seen):
         return None
     since = (seen.t[rows] - recording.t[0]) * 1e-9
-    return float(since[0]), float(since[-1])
+    # the detector's window sees a motion only once it fills a part of it
+    edge = MARGIN if since[-1] - since[0] > 10.0 * MARGIN else 0.0
+    start = float(since[0]) + (edge if rows[0] > 0 else 0.0)
+    return start, float(since[-1]) - (edge if rows[-1] < len(seen) - 1 else 0.0)
 
 
 def _cut(channel: Channel, first: int, window: Window) -> Channel:

@@ -58,7 +58,7 @@ def _lead(study: Study, lang: Language) -> str:
 
 
 def _findings(findings: tuple[Finding, ...], lang: Language) -> Iterator[Verdict]:
-    for one in findings:
+    for one in dict.fromkeys(findings):
         where = f" ({one.where})" if one.where else ""
         yield Verdict(
             say(lang, "recording"), None, None, SEVERITY[one.severity], f"{one.what}{where}", one.do

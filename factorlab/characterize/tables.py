@@ -99,12 +99,21 @@ def _gains(one: Characteristics) -> tuple[Cell, ...]:
     return tuple(found.get(factor) for factor in FACTORS)
 
 
+def _lsb(one: Characteristics) -> float | None:
+    return one.resolution.lsb if _effective(one) is not None else None
+
+
+def _effective(one: Characteristics) -> float | None:
+    """Effective bits; None where the step is that of the file's digits."""
+    return one.resolution.effective_bits if one.resolution.effective_bits > 0.0 else None
+
+
 OVERVIEW: tuple[Column, ...] = (
     ("sigma", lambda one: one.noise.sigma.value),
     ("bias", lambda one: one.bias.value),
     ("drift", lambda one: one.drift.value * 3600.0),
-    ("lsb", lambda one: one.resolution.lsb or None),
-    ("effective", lambda one: one.resolution.effective_bits),
+    ("lsb", _lsb),
+    ("effective", _effective),
     ("outliers", lambda one: one.outliers.count),
     ("density", lambda one: one.spectrum.noise_density),
 )
@@ -115,9 +124,9 @@ NORMALITY: tuple[Column, ...] = (
     ("p", lambda one: one.distribution.p),
 )
 RESOLUTION: tuple[Column, ...] = (
-    ("lsb", lambda one: one.resolution.lsb or None),
+    ("lsb", _lsb),
     ("noise_bits", lambda one: one.resolution.noise_bits),
-    ("effective", lambda one: one.resolution.effective_bits),
+    ("effective", _effective),
 )
 TIMING: tuple[Column, ...] = (
     ("outliers", lambda one: one.outliers.count),

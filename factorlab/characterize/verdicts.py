@@ -22,6 +22,7 @@ LARGE = 0.5  # σ of a reading by which the bias moves during a recording, befor
 LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
 LOUD = 0.02  # share of the noise power in a line that is worth a warning
 RARE, FAR_OUT = 1e-4, 15.0  # share of outliers, and σ of a typical one, below which nobody minds
+FEWEST_BITS = 4.0
 LATE = 0.05  # jitter over the interval
 
 
@@ -168,7 +169,8 @@ def _clear(slope: Estimate | None) -> float:
 
 def _resolution(axes: Axes, lang: Language) -> Iterator[Verdict]:
     """The axis whose noise covers the fewest steps."""
-    gridded = [one for one in axes if one.resolution.lsb > 0.0]
+    # a step far below the noise is that of the file's digits, not of a converter
+    gridded = [one for one in axes if one.resolution.effective_bits > FEWEST_BITS]
     if not gridded:
         yield Verdict(say(lang, "lsb", axis=axes[0].name), None, None, "INFO", say(lang, "lsb_none"))
         return

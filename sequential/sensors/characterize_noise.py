@@ -55,8 +55,8 @@ class Noise:
 
     @property
     def white(self) -> bool:
-        """Whether readings may be taken for independent: neighbours within 0.1, or within chance."""
-        return bool(abs(self.correlation) < max(0.1, 3.0 / self.n**0.5))
+        """Whether readings may be taken for independent: nearly all of them count, or chance explains it."""
+        return self.n_effective > 0.9 * self.n or abs(self.correlation) < 3.0 / self.n**0.5
 
 
 def noise_of(residual: Array, lsb: float = 0.0, parameters: int = 2) -> Noise:
