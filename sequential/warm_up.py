@@ -74,6 +74,10 @@ BESIDE = (
     "attitude.smoother_forward_kernel",
     "attitude.smoother_backward_kernel",
     "attitude.smoother_dense_kernel",
+    "attitude.error_state_tilt_kernel",
+    "attitude.error_state_heading_kernel",
+    "attitude.error_state_step_kernel",
+    "attitude.error_state_kernel",
     "sensors.allan_kernel",
 )
 ROOMS = (*KERNELS, *BESIDE, *MODELS)

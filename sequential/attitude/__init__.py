@@ -9,6 +9,7 @@ from sequential.attitude.angles import (
     tilt,
 )
 from sequential.attitude.complementary import ComplementaryAttitude
+from sequential.attitude.error_state import ErrorStateAttitude
 from sequential.attitude.estimator import AttitudeFilter
 from sequential.attitude.history import AttitudeHistory
 from sequential.attitude.madgwick import Madgwick
@@ -23,6 +24,7 @@ __all__ = [
     "AttitudeModel",
     "AttitudeSmoother",
     "ComplementaryAttitude",
+    "ErrorStateAttitude",
     "Madgwick",
     "Mahony",
     "TiltKalman",
