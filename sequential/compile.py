@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError
+from sequential.fusing import fused_move, fused_sight
 from sequential.manifold import Kind, Manifold
 from sequential.model import Functions, Plain, StateSpace, evaluate
 from sequential.timeline import sealed
+from sequential.wrapping import wrapped
 
 __all__ = ["Compiled", "built_in", "compiled", "made_for", "make"]
 
@@ -75,13 +77,16 @@ def _lower(model: StateSpace) -> Compiled:
         )
     ]
     fused = [_address(whole, f, raw, "", (n, f.inputs, 0)) for raw in (f.advance, f.carry)]
+    if fused[0] == 0:
+        fused[0] = _fused(whole, fused_move, f.value, f.jacobian, f.noise, n, d, f.inputs)
     sensors = list(model.sensors.values())
     lowered = list(model.sensor_functions.values())
-    observe, look = [], []
+    observe, look, see = [], [], []
     for name, sensor, g in zip(model.sensors, sensors, lowered, strict=True):
         m = sensor.manifold
         observe.append(_address(whole, g, g.value, f"sensor {name!r}", (n, g.inputs, m.size)))
         look.append(_address(whole, g, g.jacobian, f"sensor {name!r} jacobian", (n, g.inputs, m.dim * d)))
+        see.append(_fused(whole, fused_sight, g.value, g.jacobian, n, g.inputs))
     widest = max([s.manifold.dim for s in sensors] or [1])
     gate = np.array([[_threshold(s.gate, m) for m in range(widest + 1)] for s in sensors])
     z_tables = [s.manifold.table() for s in sensors] or [np.zeros((0, 5), dtype=np.int64)]
@@ -95,6 +100,7 @@ def _lower(model: StateSpace) -> Compiled:
         _ints([s.loss.code if s.loss else 0 for s in sensors]),
         np.array([s.loss.k if s.loss else 0.0 for s in sensors]),
         _flatness(model.manifold), _ints([_flatness(s.manifold) for s in sensors]), 0,
+        _ints(see),
     )  # fmt: skip
     whole.tables = ModelTables._make(sealed(v) if isinstance(v, np.ndarray) else v for v in entries)
     return whole
@@ -141,6 +147,23 @@ def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: 
     return int(made.address)
 
 
+def _fused(whole: Compiled, fuse: Callable[..., Any], value: Any, jacobian: Any, *rest: Any) -> int:
+    """Address of a function made of several of a user's, 0 where they do not lend themselves to it."""
+    taken = [raw for raw in (value, jacobian, *rest) if isinstance(raw, Plain)]
+    if (
+        value not in taken
+        or jacobian not in taken
+        or not all(isinstance(r.function, Hashable) for r in taken)
+    ):
+        return 0
+    try:
+        made = fuse(value, jacobian, *rest)
+    except Exception:  # noqa: BLE001 - where Numba refuses, each function is called by itself
+        return 0
+    whole.alive.append(made)
+    return int(made.address) if made is not None else 0
+
+
 @cache
 def built_in(raw: Callable[..., None], helpers: tuple[Callable[..., Any], ...]) -> Any:
     """A model function in the kernels' calling convention, as a C function from the disk cache."""
@@ -176,55 +199,9 @@ def make(kernel: Any, *sizes: int) -> None:
 def _compiled_or_none(raw: Plain, n: int, inputs: int) -> Any:
     """A user's function compiled once, however many models it appears in; None where Numba refuses."""
     try:
-        return _compile_plain(raw, n, inputs)
+        return wrapped(raw, n, inputs)
     except Exception:  # noqa: BLE001 - Numba refuses in many ways; all of them mean the same here
         return None
-
-
-def _compile_plain(raw: Plain, n: int, inputs: int) -> Any:
-    """A user's function as a C function; its arguments become arrays, copied if it writes to them."""
-    from numba import carray, cfunc, njit
-
-    from sequential.kernels.call import MODEL_SIGNATURE
-
-    inner = njit(error_model="numpy")(raw.function)
-    size, adds = raw.size, raw.adds
-    value, writes = try_once(raw, n, inputs)
-    own = ".copy()" if writes else ""
-    arguments = {"x": f"carray(x, ({n},)){own}", "u": f"carray(u, ({inputs},)){own}", "dt": "dt"}
-    given = ", ".join(arguments[name] for name in raw.arguments)
-    source = f"def wrapper(x, u, dt, p, out):\n    value = inner({given})\n" + _written(
-        value, size, adds=adds
-    )
-    scope: dict[str, Any] = {"inner": inner, "carray": carray, "np": np}
-    exec(source, scope)  # noqa: S102 - the text above, with nothing of the user's in it
-    return cfunc(MODEL_SIGNATURE, error_model="numpy")(scope["wrapper"])
-
-
-def _written(value: Any, size: int, *, adds: bool) -> str:
-    """Source that writes a value of this kind to `out`; numbers and tuples without a temporary array."""
-    sign = "+=" if adds else "="
-    if type(value) in {float, int, np.float64}:
-        return f"    out[0] {sign} value\n"
-    if type(value) is tuple and len(places := _places(value, "value")) == size:
-        return "".join(f"    out[{i}] {sign} {place}\n" for i, place in enumerate(places))
-    flat = "value" if type(value) is np.ndarray else "np.array(value)"
-    return f"    flat = {flat}.ravel()\n    for i in range({size}):\n        out[i] {sign} flat[i]\n"
-
-
-def _places(value: Any, name: str) -> list[str]:
-    """Where the numbers of nested tuples stand, row by row."""
-    if type(value) is not tuple:
-        return [name]
-    return [place for k, inner in enumerate(value) for place in _places(inner, f"{name}[{k}]")]
-
-
-def try_once(raw: Plain, n: int, inputs: int) -> tuple[Any, bool]:
-    """One value of a user's function, and whether it wrote to its arguments on the way."""
-    known: dict[str, Any] = {"x": np.full(n, 0.5), "u": np.zeros(max(inputs, 1)), "dt": 0.01}
-    value = raw.function(*(known[name] for name in raw.arguments))
-    aliased = isinstance(value, np.ndarray) and any(np.shares_memory(value, known[a]) for a in ("x", "u"))
-    return value, aliased or bool((known["x"] != 0.5).any() or known["u"].any())
 
 
 def _interpret(whole: Compiled, raw: Plain, sizes: tuple[int, int, int]) -> Any:

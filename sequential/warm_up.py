@@ -32,6 +32,8 @@ SMALL = (
 )
 KERNELS = (
     "linear sizes",
+    "extended sizes",
+    "unscented sizes",
     "multiple",
     "extended",
     "online_extended",
@@ -53,6 +55,8 @@ KERNELS = (
     "looking",
     "walking",
 )
+# what is made for common sizes
+SIZED = {"linear": "filter_linear", "extended": "filter_log", "unscented": "filter_sigma_points"}
 MODELS = (
     "motion",
     "unicycle",
@@ -115,14 +119,16 @@ def warm_up(progress: Callable[[str], object] = lambda _: None, *rooms: str) -> 
 
 
 def compile_kernel(name: str) -> None:
-    """Import one kernel, which compiles it, and the linear one for common sizes too."""
-    module = importlib.import_module(f"sequential.kernels.{name.removesuffix(' sizes')}")
-    if name == "linear sizes":
+    """Import one kernel, which compiles it; with " sizes" behind its name, make it for common ones too."""
+    room = name.removesuffix(" sizes")
+    module = importlib.import_module(f"sequential.kernels.{room}")
+    if room != name:
         from sequential.compile import make
         from sequential.filters.specialised import COMMON
 
-        for sizes in COMMON:
-            make(module.filter_linear, *sizes)
+        for state, reading in COMMON[room]:
+            sizes = (state, reading) if room == "linear" else (state, state, reading)
+            make(getattr(module, SIZED[room]), *sizes)
 
 
 def compile_models(name: str) -> None:

@@ -27,15 +27,16 @@ class ExtendedKalmanFilter:
     ----------
     keep : keep predictions and transitions, which smoothers need; costs a third of the time
     form : how the covariance is carried, see `sequential.filters.forms`
-    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
+    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`.
+        None does so where the size is a common one
     """
 
     keep: bool = False
     form: str = "joseph"
-    specialise: bool = False
+    specialise: bool | None = None
 
     def __post_init__(self) -> None:
-        require_form(self.form, specialise=self.specialise)
+        require_form(self.form, specialise=bool(self.specialise))
 
     @property
     def name(self) -> str:
@@ -73,7 +74,7 @@ class IteratedExtendedKalmanFilter:
 
 
 def filter_safely(
-    problem: Problem, name: str, iterations: int, form: str, *, keep: bool, specialise: bool = False
+    problem: Problem, name: str, iterations: int, form: str, *, keep: bool, specialise: bool | None = None
 ) -> Run:
     """Filter in a form; the default one gives way to UD where it ends in an indefinite covariance."""
     if form != "joseph":
@@ -91,7 +92,7 @@ def filter_problem(
     *,
     keep: bool,
     form: str = "joseph",
-    specialise: bool = False,
+    specialise: bool | None = None,
 ) -> Run:
     """Run the compiled filter and read its arrays."""
     from sequential.kernels.records import Filtered
@@ -99,7 +100,8 @@ def filter_problem(
     whole = compiled(problem.model)
     out = Filtered(*allocate(problem, whole.tables, keep=keep))
     prior = problem.model.prior
-    filter_log = kernel_of(form, iterations, sizes_of(whole.tables, specialise=specialise))
+    special = specialise if form == "joseph" and iterations == 1 else False
+    filter_log = kernel_of(form, iterations, sizes_of(whole.tables, "extended", specialise=special))
     began = time.perf_counter()
     log_likelihood, failed = filter_log(whole.tables, problem.schedule, prior.mean, prior.cov, int(keep), out)
     seconds = time.perf_counter() - began

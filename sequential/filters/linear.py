@@ -30,7 +30,7 @@ def filter_linear_problem(
     freeze = 0.0 if keep or model.process_functions.inputs else freeze
     driven = int(model.process_functions.inputs > 0)
     began = time.perf_counter()
-    _, state, reading = sizes_of(whole.tables, specialise=specialise)
+    _, state, reading = sizes_of(whole.tables, "linear", specialise=specialise)
     kernel = made_for(filter_linear) if state or reading else filter_linear
     log_likelihood, failed = kernel(
         whole.tables, problem.schedule, model.prior.mean, model.prior.cov, driven, constant, int(keep),

@@ -39,7 +39,7 @@ def each(problem: Problem, z: Array, spread: Spread, *, specialise: bool) -> Fou
     spread_of[...] = np.eye(m)
     accepted, found = np.ones((count, readings), dtype=np.int64), np.empty(count)
     constant = without_context(problem.model)
-    _, state, reading = sizes_of(whole.tables, specialise=specialise)
+    _, state, reading = sizes_of(whole.tables, "linear", specialise=specialise)
     kernel: Any = made_for(filter_each) if specialise else filter_each
     values = sealed(z)
 
@@ -94,7 +94,7 @@ def by_gains(problem: Problem, z: Array, spread: Spread, *, specialise: bool) ->
         np.empty((count, readings, m)),
         np.empty(count),
     )
-    _, state, reading = sizes_of(compiled(model).tables, specialise=specialise)
+    _, state, reading = sizes_of(compiled(model).tables, "linear", specialise=specialise)
     kernel: Any = made_for(filter_by_gains) if specialise else filter_by_gains
     fixed = [
         sealed(a)

@@ -14,17 +14,22 @@ __all__ = ["COMMON", "Sizes", "made_for", "sizes_of"]
 
 Sizes = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 ANY: Sizes = ((), (), ())
-# state and reading of tracks on a line, in the plane and in space: what a linear filter is made for unasked
-COMMON = ((2, 1), (4, 2), (6, 3), (9, 3))
+# State and reading for which a kernel is made unasked.  Linear: tracks on a line, in the plane and in space.
+# Nonlinear: a planar pose that is ranged or ranged with a bearing, a planar track seen by a radar.
+COMMON = {
+    "linear": ((2, 1), (4, 2), (6, 3), (9, 3)),
+    "extended": ((3, 1), (3, 2), (4, 2)),
+    "unscented": ((3, 1), (3, 2), (4, 2)),
+}
 
 
-def sizes_of(tables: Any, *, specialise: bool | None) -> Sizes:
+def sizes_of(tables: Any, kernel: str, *, specialise: bool | None) -> Sizes:
     """Storage, tangent and reading as tuples of that length, whose types tell the sizes to the compiler.
 
-    With `specialise` None they are told where they are common ones.
+    With `specialise` None they are told where they are common ones of that kernel.
     """
     dims = set(tables.z_dim.tolist())
-    common = len(dims) == 1 and tables.n == tables.d and (tables.d, min(dims)) in COMMON
+    common = len(dims) == 1 and tables.n == tables.d and (tables.d, min(dims)) in COMMON[kernel]
     if not (common if specialise is None else specialise):
         return ANY
     reading = (0,) * dims.pop() if len(dims) == 1 else ()

@@ -82,6 +82,7 @@ def stack(problem: Problem, models: Sequence[StateSpace]) -> tuple[Any, list[Any
         np.stack([t.loss_k for t in tables]),
         np.full(gate.shape[1:], -1.0),
         np.full(gate.shape[1:], np.inf),
+        np.stack([t.see for t in tables]),
     )
     return Modes(*map(sealed, entries)), [alive, same]
 

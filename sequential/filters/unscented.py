@@ -33,7 +33,8 @@ class UnscentedKalmanFilter:
     beta : β of "merwe", 2 is best for Gaussians
     kappa : κ of "merwe" and "julier", secondary spread; below zero a covariance may come out indefinite
     keep : keep predictions and transitions (slopes of the regression), which smoothers need
-    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`
+    specialise : compile the loop for this size of model, once per machine: `sequential.filters.specialised`.
+        None does so where the size is a common one
     points : "merwe" (2d + 1 points at ±γ along the columns of L, γ² = α² (d + κ)), "julier" (the same with
         α = 1 and β = 0: Julier, Uhlmann 1997) or "simplex" (d + 1 points: Moireau, Chapelle 2011), which
         takes none of α, β and κ
@@ -48,7 +49,7 @@ class UnscentedKalmanFilter:
     beta: float = 2.0
     kappa: float = 0.0
     keep: bool = False
-    specialise: bool = False
+    specialise: bool | None = None
     points: str = "merwe"
 
     def __post_init__(self) -> None:
@@ -95,7 +96,7 @@ class CubatureKalmanFilter:
 
 
 def filter_points(
-    problem: Problem, name: str, chosen: SigmaSet, *, keep: bool, specialise: bool = False
+    problem: Problem, name: str, chosen: SigmaSet, *, keep: bool, specialise: bool | None = None
 ) -> Run:
     """Run the compiled filter with a set of points and read its arrays."""
     from sequential.kernels.records import Filtered
@@ -105,11 +106,12 @@ def filter_points(
     out = Filtered(*allocate(problem, whole.tables, keep=keep))
     prior, d = problem.model.prior, whole.tables.d
     weights, unit = sealed(chosen.weights(d)), sealed(chosen.unit(d))
+    sizes = sizes_of(whole.tables, "unscented", specialise=specialise)
+    kernel = made_for(filter_sigma_points) if any(sizes) else filter_sigma_points
     began = time.perf_counter()
-    kernel = made_for(filter_sigma_points) if specialise else filter_sigma_points
     log_likelihood, failed = kernel(
         whole.tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out,
-        *sizes_of(whole.tables, specialise=specialise),
+        *sizes,
     )  # fmt: skip
     seconds = time.perf_counter() - began
     return finished(problem, whole, out, name, (log_likelihood, failed, seconds), keep=keep)

@@ -8,29 +8,32 @@ from numba import types
 
 from sequential.kernels.arrays import b0, f0, f1, f2, i0, w1, w2
 from sequential.kernels.call import inlined, inlined_as
-from sequential.kernels.matrices import (
-    cholesky,
-    multiply,
-    multiply_nt,
-    solve_lower,
-    solve_lower_transposed,
-    symmetrise,
-)
+from sequential.kernels.matrices import TINY, multiply, multiply_nt, symmetrise
 from sequential.kernels.sizes import reading_dim
 
-__all__ = ["LOG_TWO_PI", "add_correction", "admit", "gain_and_innovation", "joseph"]
+__all__ = ["LOG_TWO_PI", "add_correction", "admit", "gain_and_innovation", "joseph", "tallied"]
 
 PAIR = types.Tuple([f0, f0])
+TRIPLE = types.Tuple([f0, f0, f0])
 LOG_TWO_PI = math.log(2.0 * math.pi)
 TINIEST, LARGEST = 1e-100, 1e100  # within these a product of pivots is kept, for one logarithm at the end
 
 
-@inlined_as(PAIR(f2, f2, f2, f0, f1, i0, i0, w2, w2, w2, w2))
-def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain):
-    """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹; returns (NIS, log det S), NIS negative if S is not positive definite.
+@inlined_as(PAIR(f0, f0))
+def tallied(logarithm, product):
+    """(a, b) with a + log b the same, and b within bounds."""
+    if TINIEST < product < LARGEST:
+        return logarithm, product
+    return logarithm + math.log(product), 1.0
 
-    `gain` holds Kᵀ (m, d), `lower` the Cholesky factor of S; `cross` (m, d) is scratch: H P, then the
-    whitened residual in its first column.
+
+@inlined_as(TRIPLE(f2, f2, f2, f0, f1, i0, i0, w2, w2, w2, w2, w1))
+def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain, white):
+    """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹, with the NIS, which is negative if S is not positive definite.
+
+    Returns (NIS, a, b) where log det S = 2 (a + log b): logarithms are dear, and those of many readings can
+    be one.  `gain` holds Kᵀ (m, d), `lower` the Cholesky factor of S with the inverses of its diagonal,
+    `cross` H P, `white` the whitened residual.
     """
     share = 1.0 / weight
     multiply(h, p, cross, m, d, d)
@@ -39,41 +42,55 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
         for j in range(m):
             innovation_cov[i, j] += noise[i, j] * share
     symmetrise(innovation_cov, m)
-    if cholesky(innovation_cov, lower, m, False) > 0:
-        return -1.0, 0.0
-    for i in range(m):
-        for j in range(d):
-            gain[i, j] = cross[i, j]
-    solve_lower(lower, gain, m, d)
-    solve_lower_transposed(lower, gain, m, d)
     nis, log_det, determinant = 0.0, 0.0, 1.0
     for i in range(m):
         s = residual[i]
+        for j in range(i):
+            t = innovation_cov[i, j]
+            for k in range(j):
+                t -= lower[i, k] * lower[j, k]
+            lower[i, j] = t * lower[j, j]
+            s -= lower[i, j] * white[j]
+        t = innovation_cov[i, i]
         for k in range(i):
-            s -= lower[i, k] * cross[k, 0]
-        cross[i, 0] = s / lower[i, i]
-        nis += cross[i, 0] * cross[i, 0]
-        determinant *= lower[i, i]
-        if not TINIEST < determinant < LARGEST:
-            log_det += math.log(determinant)
-            determinant = 1.0
-    return nis, 2.0 * (log_det + math.log(determinant))
+            t -= lower[i, k] * lower[i, k]
+        if not t > TINY * innovation_cov[i, i]:
+            return -1.0, 0.0, 1.0
+        pivot = math.sqrt(t)
+        inverse = 1.0 / pivot
+        lower[i, i] = inverse
+        white[i] = s * inverse
+        nis += white[i] * white[i]
+        log_det, determinant = tallied(log_det, determinant * pivot)
+        for j in range(d):
+            t = cross[i, j]
+            for k in range(i):
+                t -= lower[i, k] * gain[k, j]
+            gain[i, j] = t * inverse
+    for i in range(m - 1, -1, -1):
+        for j in range(d):
+            t = gain[i, j]
+            for k in range(i + 1, m):
+                t -= lower[k, i] * gain[k, j]
+            gain[i, j] = t * lower[i, i]
+    return nis, log_det, determinant
 
 
-@inlined_as(b0(f2, f2, f2, f2, f0, i0, i0, w2, w2, w2))
-def joseph(p, h, gain, noise, weight, m, d, out, projected, spread):
-    """out = (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ, with Kᵀ (m, d) in `gain`; False: a variance is negative.
+@inlined_as(b0(f2, f2, f2, f2, f2, f0, i0, i0, w2, w2))
+def joseph(p, h, cross, gain, noise, weight, m, d, out, spread):
+    """out = (I - K H) P (I - K H)ᵀ + K (R/w) Kᵀ; False: a variance is negative.
+
+    Kᵀ (m, d) stands in `gain`, H P in `cross`.
 
     Multiplied out as M - (M Hᵀ - K R/w) Kᵀ with M = P - K H P, which holds for any gain and costs no product
     of two (d, d) matrices (Bierman 1977, section V.2).
     """
     share = 1.0 / weight
-    multiply(h, p, projected, m, d, d)
     for i in range(d):
         for j in range(d):
             s = p[i, j]
             for k in range(m):
-                s -= gain[k, i] * projected[k, j]
+                s -= gain[k, i] * cross[k, j]
             out[i, j] = s
         for a in range(m):
             s = 0.0

@@ -12,7 +12,7 @@ from numba import types
 from numba.extending import register_jitable
 
 from sequential.kernels.arrays import f0, f1, i0, i2, w1, w2
-from sequential.kernels.call import bare, bare_as
+from sequential.kernels.call import bare, bare_as, inlined_as
 from sequential.kernels.poses import (
     se2_adjoint_inverse,
     se2_exp,
@@ -31,14 +31,28 @@ for helper in (rotation, quaternion_exp, quaternion_product, right_jacobian):
     register_jitable(helper)
 
 VECTOR, SO2, SO3, SE2, SE3, NAV = range(6)
+TURN, TURN_REST = 6.2831853069365025, 2.430840202602477e-10  # 2π; the first part has 31 bits
+FAR = 1e6  # rad: up to here multiples of it are exact
 
 
 @bare_as(f0(f0))
+def unwind(angle):
+    """Angle in ]-π, π] of one that is not there."""
+    if not abs(angle) < FAR:
+        return math.atan2(math.sin(angle), math.cos(angle))
+    turns = math.floor(angle / (2.0 * math.pi) + 0.5)
+    left = (angle - turns * TURN) - turns * TURN_REST
+    if left > math.pi:
+        left -= 2.0 * math.pi
+    elif left <= -math.pi:
+        left += 2.0 * math.pi
+    return left
+
+
+@inlined_as(f0(f0))
 def wrap(angle):
     """Angle in ]-π, π]; one that is there already stays as it is, to the last bit."""
-    if -math.pi < angle <= math.pi:
-        return angle
-    return math.atan2(math.sin(angle), math.cos(angle))
+    return angle if -math.pi < angle <= math.pi else unwind(angle)
 
 
 @bare_as(types.void(i2, i0, i0, f1, i0, f1, i0, w1, i0))

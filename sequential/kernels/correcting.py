@@ -53,31 +53,34 @@ def doubtful(innovation_cov, lower, m):
     """Whether a pivot of S has kept too few digits."""
     found = False
     for i in range(m):
-        found = found or not lower[i, i] * lower[i, i] > DOUBTFUL * innovation_cov[i, i]
+        found = found or not DOUBTFUL * innovation_cov[i, i] * lower[i, i] * lower[i, i] < 1.0
     return found
 
 
 @inlined
 def correct(p, h, noise, weight, residual, m, d, update):
-    """K·residual into `delta`; returns (NIS, log det S, whether it had to be redone), NIS -1 for an S < 0."""
+    """K·residual into `delta`; returns (NIS, a, b, whether it had to be redone), NIS -1 for an S < 0.
+
+    log det S = 2 (a + log b), as in `gain_and_innovation`.
+    """
     cross, gain, innovation_cov, lower, delta = update[2], update[3], update[4], update[5], update[7]
-    nis, log_det = gain_and_innovation(
-        p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain
+    nis, log_det, determinant = gain_and_innovation(
+        p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain, update[8]
     )
     if nis < 0.0 or doubtful(innovation_cov, lower, m):
         nis, log_det = redo(p, h, noise, weight, residual, m, d, update[9], delta, update[10])
-        return nis, log_det, True
+        return nis, 0.5 * log_det, 1.0, True
     for i in range(d):
         delta[i] = 0.0
     add_correction(gain, residual, m, d, delta)
-    return nis, log_det, False
+    return nis, log_det, determinant, False
 
 
 @inlined
-def settle(p, h, noise, weight, residual, m, d, update, work, redone):
+def settle(p, h, noise, weight, residual, m, d, update, redone):
     """Make P the covariance after the correction that came before; False where there is none."""
-    gain, scaled, delta, updated = update[3], update[6], update[7], update[9]
-    sound = redone or joseph(p, h, gain, noise, weight, m, d, updated, work[1], scaled)
+    cross, gain, scaled, delta, updated = update[2], update[3], update[6], update[7], update[9]
+    sound = redone or joseph(p, h, cross, gain, noise, weight, m, d, updated, scaled)
     if not sound:
         sound = redo(p, h, noise, weight, residual, m, d, updated, delta, update[10])[0] >= 0.0
     for i in range(d):
@@ -97,12 +100,12 @@ def doubt_scratch(d, widest):
 def correction_scratch(n, d, widest):
     """Arrays for an update, of type CORRECTION.
 
-    H (m, d), scratch of a look, H P, Kᵀ, S, its factor, K R, K·residual, a tangent vector, the new
+    H (m, d), scratch of a look, H P, Kᵀ, S, its factor, K R, K·residual, a vector, the new
     covariance, and those of a doubtful update.
     """
     flat = np.empty(scratch_size(n, d, widest))
     return (
         np.empty((widest, d)), flat, np.empty((widest, d)), np.empty((widest, d)),
         np.empty((widest, widest)), np.empty((widest, widest)), np.empty((d, max(widest, d))),
-        np.empty(d), np.empty(d), np.empty((d, d)), doubt_scratch(d, widest),
+        np.empty(d), np.empty(max(d, widest)), np.empty((d, d)), doubt_scratch(d, widest),
     )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2, w1, w2
-from sequential.kernels.belief import LOG_TWO_PI, admit
+from sequential.kernels.belief import LOG_TWO_PI, admit, tallied
 from sequential.kernels.call import allocating, inlined
 from sequential.kernels.charts import retract, transport
 from sequential.kernels.correcting import CORRECTION, correct, correction_scratch, settle
@@ -20,7 +20,7 @@ from sequential.kernels.flat import retract_state
 from sequential.kernels.matrices import copy_matrix, copy_vector, fill_diagonal, multiply, multiply_nt
 from sequential.kernels.moving import predict
 from sequential.kernels.records import FILTERED, FINISHED, MODEL, SCHEDULE
-from sequential.kernels.sensing import loss_weight, measure, sensor_jacobian
+from sequential.kernels.sensing import look, loss_weight, measure, sensor_jacobian
 from sequential.kernels.sizes import ANY_SIZE, reading_dim, sized
 
 __all__ = ["filter_log"]
@@ -34,7 +34,7 @@ def iterate(model, plan, reading, x, p, weight, iterations, update, work, expect
     """Relinearise an update until it settles, from the plain update that stands in `delta`; False: S < 0."""
     s = plan.sensor[reading]
     m, d, blocks = model.z_dim[s], model.d, len(model.table)
-    h, flat, delta, back = update[0], update[1], update[7], update[8]
+    h, flat, delta, back = update[0], update[1], update[7], np.empty(d)
     noise = plan.noise_cov[plan.noise_row[reading]]
     start, prior, total = x.copy(), p.copy(), np.empty(d)
     retract(model.table, 0, blocks, start, 0, delta, 0, x, 0)
@@ -53,7 +53,7 @@ def iterate(model, plan, reading, x, p, weight, iterations, update, work, expect
         for i in range(m):
             for k in range(d):
                 residual[i] -= h[i, k] * back[k]
-        nis, _, redone = correct(p, h, noise, weight, residual, m, d, update)
+        nis, _, _, redone = correct(p, h, noise, weight, residual, m, d, update)
         if nis < 0.0:
             return False
         largest = 0.0
@@ -63,38 +63,40 @@ def iterate(model, plan, reading, x, p, weight, iterations, update, work, expect
         retract(model.table, 0, blocks, x, 0, total, 0, x, 0)
         if largest < CONVERGED:
             break
-    return settle(p, h, noise, weight, residual, m, d, update, work, redone)
+    return settle(p, h, noise, weight, residual, m, d, update, redone)
 
 
 @inlined
 def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):
-    """Update the belief by one reading; returns its log likelihood, 0 if gated, NaN if S is indefinite."""
+    """Update the belief by one reading; (a, b) where its log likelihood is a - log b.
+
+    That is (0, 1) if it was gated; a is NaN if S is indefinite.
+    """
     s = plan.sensor[reading]
     m, d = reading_dim(model, s), model.d
     h, delta = update[0], update[7]
     noise = plan.noise_cov[plan.noise_row[reading]]
-    measure(model, plan, reading, x, 0, expected, residual)
-    sensor_jacobian(model, plan, reading, x, 0, expected, update[1], h)
-    nis, log_det, redone = correct(p, h, noise, 1.0, residual, m, d, update)
+    look(model, plan, reading, x, 0, expected, residual, update[1], h)
+    nis, log_det, determinant, redone = correct(p, h, noise, 1.0, residual, m, d, update)
     verdict = admit(model, plan, reading, nis, residual, update[4], out)
     if verdict < 1:
-        return math.nan if verdict < 0 else 0.0
-    log_likelihood = -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
+        return math.nan if verdict < 0 else 0.0, 1.0
+    gained = -0.5 * (nis + plan.rows[reading] * LOG_TWO_PI) - log_det
     weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
     if weight < 1.0:
-        redone = correct(p, h, noise, weight, residual, m, d, update)[2]
+        redone = correct(p, h, noise, weight, residual, m, d, update)[3]
     if iterations > 1:
         sound = iterate(model, plan, reading, x, p, weight, iterations, update, work, expected, residual)
     else:
-        sound = settle(p, h, noise, weight, residual, m, d, update, work, redone)
+        sound = settle(p, h, noise, weight, residual, m, d, update, redone)
         retract_state(model, x, 0, delta, 0, x, 0)
-    return log_likelihood if sound else math.nan
+    return gained if sound else math.nan, determinant
 
 
 @inlined
 def filter_nodes(model, plan, belief, x, p, phi, iterations, work, update, expected, residual, keep, out):
     """The loop of `filter_log`, with every array at hand."""
-    log_likelihood = 0.0
+    log_likelihood, logarithm, product = 0.0, 0.0, 1.0
     for node in range(len(plan.reading_ptr) - 1):
         if keep != 0:
             fill_diagonal(phi, 1.0)
@@ -104,15 +106,18 @@ def filter_nodes(model, plan, belief, x, p, phi, iterations, work, update, expec
             copy_matrix(p, out.predicted_cov[node])
             copy_matrix(phi, out.transition[node])
         for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
-            gain_log = absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out)
-            if math.isnan(gain_log):
+            gained, share = absorb(
+                model, plan, reading, x, p, iterations, update, work, expected, residual, out
+            )
+            if math.isnan(gained):
                 copy_vector(x, out.mean[node])
                 copy_matrix(p, out.cov[node])
                 return log_likelihood, reading
-            log_likelihood += gain_log
+            log_likelihood += gained
+            logarithm, product = tallied(logarithm, product * share)
         copy_vector(x, out.mean[node])
         copy_matrix(p, out.cov[node])
-    return log_likelihood, -1
+    return log_likelihood - logarithm - math.log(product), -1
 
 
 @allocating

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sequential.kernels.call import inlined
 from sequential.kernels.charts import local, retract, wrap
 
-__all__ = ["GENERAL", "local_reading", "retract_state"]
+__all__ = ["ANGLES", "GENERAL", "PLAIN", "local_reading", "retract_state"]
 
 GENERAL, ANGLES, PLAIN = 0, 1, 2  # anything; blocks of numbers and angles; one block of numbers
 

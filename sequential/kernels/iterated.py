@@ -54,8 +54,8 @@ def absorb_step(model, plan, reading, trajectory, at, mean, cov, update, work, e
     for i in range(m):
         for k in range(d):
             residual[i] -= h[i, k] * mean[k]
-    nis, _, redone = correct(cov, h, noise, weight, residual, m, d, update)
-    if nis < 0.0 or not settle(cov, h, noise, weight, residual, m, d, update, work, redone):
+    nis, _, _, redone = correct(cov, h, noise, weight, residual, m, d, update)
+    if nis < 0.0 or not settle(cov, h, noise, weight, residual, m, d, update, redone):
         return -1
     for i in range(d):
         mean[i] += update[7][i]

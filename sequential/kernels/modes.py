@@ -29,10 +29,11 @@ class Modes(NamedTuple):
     loss_k: Any  # (J, S)
     shut: Any  # (S, m+1) gates that shut everything out
     open: Any  # (S, m+1) and gates that let everything in
+    see: Any  # (J, S)
 
 
 STACKED = types.Array(types.float64, 4, "C", readonly=True)
-MODES = types.NamedTuple([i2, f2, i2, i2, f2, i2, STACKED, f3, i2, f2, f2, f2], Modes)
+MODES = types.NamedTuple([i2, f2, i2, i2, f2, i2, STACKED, f3, i2, f2, f2, f2, i2], Modes)
 # mean (J, K, n), cov (J, K, d, d), residual (J, M, m), residual_cov (J, M, m, m), accepted (J, M)
 MODE_OUT = types.Tuple(
     [w3, types.float64[:, :, :, ::1], w3, types.float64[:, :, :, ::1], types.int64[:, ::1]]
@@ -47,7 +48,7 @@ def mode_of(base, modes, j, gate):
         modes.process[j, 3], modes.process[j, 4], modes.params[j], modes.observe[j],
         modes.observe_jacobian[j], modes.sensor_params[j], modes.sensor_params_at[j], base.z_table,
         base.z_first, base.z_size, base.z_dim, gate, modes.loss[j], modes.loss_k[j],
-        base.flat, base.z_flat, base.m,
+        base.flat, base.z_flat, base.m, modes.see[j],
     )  # fmt: skip
 
 

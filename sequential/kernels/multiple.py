@@ -54,7 +54,9 @@ def inside(base, modes, plan, reading, beliefs, update, expected, residual):
         measure(model, own, reading, x, 0, expected, residual)
         sensor_jacobian(model, own, reading, x, 0, expected, flat, h)
         noise = own.noise_cov[own.noise_row[reading]]
-        nis, _ = gain_and_innovation(p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain)
+        nis, _, _ = gain_and_innovation(
+            p, h, noise, 1.0, residual, m, d, innovation_cov, lower, cross, gain, update[8]
+        )
         if not nis > modes.gate[j, s, rows]:
             return True
     return False
@@ -92,12 +94,13 @@ def judge(base, modes, plan, reading, beliefs, mu, gained, iterations, scratch, 
         model = mode_of(base, modes, j, modes.open if taken else modes.shut)
         belief = beliefs[j]
         x, p = belief[:n], belief[n:].reshape((d, d))
-        gained[j] = absorb(
+        gained[j], share = absorb(
             model, plan_of(plan, modes, j), reading, x, p, iterations, update, work, expected, own_residual,
             filtered_of(out, j),
         )  # fmt: skip
         if math.isnan(gained[j]):
             return math.nan
+        gained[j] -= math.log(share)
     combine_innovation(base, plan, reading, mu, out, residual, residual_cov)
     if not taken:
         return 0.0

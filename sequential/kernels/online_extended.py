@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import njit, types
 
 from sequential.kernels.arrays import f0, f1, f2, i0, w1
@@ -36,7 +38,8 @@ def extended_step(address, dt, sensor, belief, z, u, context, noise, out):
     predict(model, plan, 0, both, x, p, phi, 0, work)
     log_likelihood = 0.0
     if plan.reading_ptr[1] > 0:
-        log_likelihood = absorb(model, plan, 0, x, p, iterations, update, work, expected, residual, filtered)
+        gained, share = absorb(model, plan, 0, x, p, iterations, update, work, expected, residual, filtered)
+        log_likelihood = gained - math.log(share)
     for i in range(size):
         out[i] = both[i]
     return report(model, filtered, size, log_likelihood, out)

@@ -29,7 +29,9 @@ def sigma_points_step(address, dt, sensor, belief, z, u, context, noise, out):
     for i in range(d):
         for j in range(d):
             p[i, j] = belief[n + i * d + j]
-    log_likelihood, failed = filter_sigma_points(model, plan, x, p, weights, unit, 0, filtered, (), (), ())
+    log_likelihood, failed = filter_sigma_points(
+        model, plan, x, p, weights, unit, 0, filtered, (), (), ()
+    )  # fmt: skip
     for i in range(n):
         out[i] = filtered.mean[0, i]
     for i in range(d):

@@ -38,6 +38,7 @@ class ModelTables(NamedTuple):
     flat: int  # how the state's tangents add, see `kernels.flat`
     z_flat: Any  # (S,) the same for measurements
     m: int  # tangent of every measurement in a kernel made for one size, else 0
+    see: Any  # (S,) addresses of sensors that write their Jacobian behind the measurement, or 0
 
 
 _int = types.int64
@@ -66,6 +67,7 @@ MODEL = types.NamedTuple(
         _int,
         i1,
         _int,
+        i1,
     ],
     ModelTables,
 )

@@ -17,7 +17,7 @@ from sequential.kernels.charts import local, retract
 from sequential.kernels.flat import local_reading
 from sequential.kernels.sizes import reading_dim
 
-__all__ = ["loss_weight", "measure", "process_jacobian", "scratch_size", "sensor_jacobian"]
+__all__ = ["look", "loss_weight", "measure", "process_jacobian", "scratch_size", "sensor_jacobian"]
 
 STEP = 1e-6  # of central differences, in the units of the tangent
 CAUCHY = 2
@@ -25,8 +25,8 @@ CAUCHY = 2
 
 @bare_as(i0(i0, i0, i0))
 def scratch_size(n, d, widest):
-    """Numbers that a look may need: a Jacobian, or a step, a state and three measurements."""
-    return max(widest * d, d + n + 3 * widest)
+    """Numbers that a look may need: a measurement and H, or a step, a state and three measurements."""
+    return max(widest * (d + 1), d + n + 3 * widest)
 
 
 @allocating
@@ -62,13 +62,19 @@ def process_jacobian(model, x, u, row, dt, after, out):
 def measure(model, plan, reading, x, x_at, expected, residual):
     """Expected measurement at x, and residual = local(expected, z), zero where a component is missing."""
     s = plan.sensor[reading]
-    z_at = reading * plan.z.shape[1]
     call(
         model.observe[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
         model.sensor_params, model.sensor_params_at[s], expected, 0,
     )  # fmt: skip
+    differ(model, plan, reading, expected, residual)
+
+
+@inlined
+def differ(model, plan, reading, expected, residual):
+    """The tangent vector residual = local(expected, z), zero where a component is missing."""
+    s = plan.sensor[reading]
     m = reading_dim(model, s)
-    local_reading(model, s, m, expected, 0, plan.z_flat, z_at, residual, 0)
+    local_reading(model, s, m, expected, 0, plan.z_flat, reading * plan.z.shape[1], residual, 0)
     if plan.rows[reading] < m:
         for i in range(m):
             if math.isnan(plan.z[reading, i]):
@@ -119,11 +125,39 @@ def sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out):
         for i in range(m):
             for j in range(model.d):
                 out[i, j] = flat[i * model.d + j]
+    forget_missing(model, plan, reading, m, out)
+
+
+@inlined
+def forget_missing(model, plan, reading, m, out):
+    """Rows of missing components become zero."""
     if plan.rows[reading] < m:
         for i in range(m):
             if math.isnan(plan.z[reading, i]):
                 for j in range(model.d):
                     out[i, j] = 0.0
+
+
+@inlined
+def look(model, plan, reading, x, x_at, expected, residual, flat, out):
+    """Residual and H (m, d) of a reading at once: `measure` and `sensor_jacobian`."""
+    s = plan.sensor[reading]
+    if model.see[s] == 0:
+        measure(model, plan, reading, x, x_at, expected, residual)
+        sensor_jacobian(model, plan, reading, x, x_at, expected, flat, out)
+        return
+    call(
+        model.see[s], x, x_at, plan.context, reading * plan.context.shape[1], 0.0,
+        model.sensor_params, model.sensor_params_at[s], flat, 0,
+    )  # fmt: skip
+    m, size = reading_dim(model, s), model.z_size[s]
+    for i in range(size):
+        expected[i] = flat[i]
+    for i in range(m):
+        for j in range(model.d):
+            out[i, j] = flat[size + i * model.d + j]
+    differ(model, plan, reading, expected, residual)
+    forget_missing(model, plan, reading, m, out)
 
 
 @bare_as(f0(i0, f0, f0))

@@ -15,6 +15,7 @@ import math
 
 from sequential.kernels.call import inlined
 from sequential.kernels.charts import local, retract, wrap
+from sequential.kernels.flat import ANGLES, GENERAL
 
 __all__ = [
     "factor",
@@ -32,7 +33,7 @@ PASSES = 10  # over a mean on a manifold; two suffice but for a spread of radian
 SETTLED = 1e-9  # a correction below this is exact to rounding when subtracted from the tangents
 LOST = 1e-13  # a pivot below this share of its diagonal is rounding: a direction without uncertainty
 INDEFINITE = -1e-6  # and one that is this negative is not
-VECTOR, SO2 = 0, 1
+VECTOR = 0
 
 
 @inlined
@@ -58,9 +59,8 @@ def factor(p, d, lower):
 
 
 @inlined
-def place(table, n, d, x, lower, weights, unit, steps, points):
-    """Rows x, x ⊕ L u of `points` for every u of the set; `steps` holds the tangents L u."""
-    count = 2 * d if unit.shape[0] == 0 else unit.shape[0]
+def place(flat, table, n, d, count, x, lower, weights, unit, steps, points, points_flat):
+    """Rows x, x ⊕ L u of `points` for each of `count` u of the set; `steps` holds the tangents L u."""
     if unit.shape[0] == 0:
         for i in range(d):
             for j in range(d):
@@ -76,85 +76,79 @@ def place(table, n, d, x, lower, weights, unit, steps, points):
                 steps[j, i] = s
     for i in range(n):
         points[0, i] = x[i]
-    for b in range(len(table)):
-        kind, s, t = table[b, 0], table[b, 1], table[b, 2]
-        if kind == VECTOR:
-            for i in range(table[b, 3]):
+    if flat == GENERAL:
+        step = steps.reshape(-1)
+        for j in range(count):
+            retract(table, 0, len(table), x, 0, step, j * d, points_flat, (j + 1) * n)
+        return
+    for j in range(count):
+        for i in range(n):
+            points[j + 1, i] = x[i] + steps[j, i]
+    if flat == ANGLES:
+        for b in range(len(table)):
+            if table[b, 0] != VECTOR:
+                at = table[b, 1]
                 for j in range(count):
-                    points[j + 1, s + i] = x[s + i] + steps[j, t + i]
-        elif kind == SO2:
-            for j in range(count):
-                points[j + 1, s] = near(x[s] + steps[j, t])
-        else:
-            flat, step = points.reshape(-1), steps.reshape(-1)
-            for j in range(count):
-                retract(table, b, b + 1, x, 0, step, j * d, flat, (j + 1) * n)
-    return count
+                    points[j + 1, at] = wrap(points[j + 1, at])
 
 
 @inlined
-def near(angle):
-    """Angle in ]-π, π], quickly where it is there already."""
-    return angle if -math.pi < angle <= math.pi else wrap(angle)
-
-
-@inlined
-def shift(table, first, last, x, xi):
+def shift(flat, table, first, last, size, x, xi):
     """x <- x ⊕ xi."""
-    for b in range(first, last):
-        kind, s, t = table[b, 0], table[b, 1], table[b, 2]
-        if kind == VECTOR:
-            for i in range(table[b, 3]):
-                x[s + i] += xi[t + i]
-        elif kind == SO2:
-            x[s] = near(x[s] + xi[t])
-        else:
-            retract(table, b, b + 1, x, 0, xi, 0, x, 0)
+    if flat == GENERAL:
+        retract(table, first, last, x, 0, xi, 0, x, 0)
+        return
+    for i in range(size):
+        x[i] += xi[i]
+    if flat == ANGLES:
+        for b in range(first, last):
+            if table[b, 0] != VECTOR:
+                x[table[b, 1]] = wrap(x[table[b, 1]])
 
 
 @inlined
-def tangent_to(table, first, last, x, y, y_at, out):
+def tangent_to(flat, table, first, last, dim, x, y, y_at, out):
     """The tangent at x that leads to y, which begins at `y_at`."""
-    for b in range(first, last):
-        kind, s, t = table[b, 0], table[b, 1], table[b, 2]
-        if kind == VECTOR:
-            for i in range(table[b, 3]):
-                out[t + i] = y[y_at + s + i] - x[s + i]
-        elif kind == SO2:
-            out[t] = near(y[y_at + s] - x[s])
-        else:
-            local(table, b, b + 1, x, 0, y, y_at, out, 0)
+    if flat == GENERAL:
+        local(table, first, last, x, 0, y, y_at, out, 0)
+        return
+    for i in range(dim):
+        out[i] = y[y_at + i] - x[i]
+    if flat == ANGLES:
+        for b in range(first, last):
+            if table[b, 0] != VECTOR:
+                out[table[b, 2]] = wrap(out[table[b, 2]])
 
 
 @inlined
-def tangents_from(table, first, last, count, mean, points, tangents):
+def tangents_from(flat, table, first, last, dim, count, mean, points, tangents, points_flat):
     """Rows of tangents that lead from a mean to every point."""
-    for b in range(first, last):
-        kind, s, t = table[b, 0], table[b, 1], table[b, 2]
-        if kind == VECTOR:
-            for i in range(table[b, 3]):
+    if flat == GENERAL:
+        out, width, wide = tangents.reshape(-1), points.shape[1], tangents.shape[1]
+        for j in range(count + 1):
+            local(table, first, last, mean, 0, points_flat, j * width, out, j * wide)
+        return
+    for j in range(count + 1):
+        for i in range(dim):
+            tangents[j, i] = points[j, i] - mean[i]
+    if flat == ANGLES:
+        for b in range(first, last):
+            if table[b, 0] != VECTOR:
+                at = table[b, 2]
                 for j in range(count + 1):
-                    tangents[j, t + i] = points[j, s + i] - mean[s + i]
-        elif kind == SO2:
-            for j in range(count + 1):
-                tangents[j, t] = near(points[j, s] - mean[s])
-        else:
-            flat, out = points.reshape(-1), tangents.reshape(-1)
-            width, wide = points.shape[1], tangents.shape[1]
-            for j in range(count + 1):
-                local(table, b, b + 1, mean, 0, flat, j * width, out, j * wide)
+                    tangents[j, at] = wrap(tangents[j, at])
 
 
 @inlined
-def mean_of(table, first, last, size, dim, count, points, weights, mean, tangents, move):
+def mean_of(
+    flat, table, first, last, size, dim, count, points, weights, mean, tangents, move, points_flat
+):  # fmt: skip
     """Mean of `count` + 1 points (row 0 central) about the central one, and the tangents there to all."""
-    curved, central, each = False, weights[1], weights[3]
-    for b in range(first, last):
-        curved = curved or table[b, 0] > SO2
+    central, each = weights[1], weights[3]
     for i in range(size):
         mean[i] = points[0, i]
     for _ in range(PASSES):
-        tangents_from(table, first, last, count, mean, points, tangents)
+        tangents_from(flat, table, first, last, dim, count, mean, points, tangents, points_flat)
         largest = 0.0
         for k in range(dim):
             total = 0.0
@@ -162,16 +156,18 @@ def mean_of(table, first, last, size, dim, count, points, weights, mean, tangent
                 total += tangents[j, k]
             move[k] = each * total + central * tangents[0, k]
             largest = max(largest, abs(move[k]))
-        shift(table, first, last, mean, move)
-        if not curved or not largest > SETTLED:
+        shift(flat, table, first, last, size, mean, move)
+        if flat != GENERAL or not largest > SETTLED:
             break
-    wrapped = False
-    for k in range(dim):
-        for j in range(count + 1):
+    for j in range(count + 1):
+        for k in range(dim):
             tangents[j, k] -= move[k]
-            wrapped = wrapped or abs(tangents[j, k]) > math.pi
-    if wrapped and not curved:  # an angle may have come round
-        tangents_from(table, first, last, count, mean, points, tangents)
+    if flat == ANGLES:  # one may have come round
+        for b in range(first, last):
+            if table[b, 0] != VECTOR:
+                at = table[b, 2]
+                for j in range(count + 1):
+                    tangents[j, at] = wrap(tangents[j, at])
 
 
 @inlined

@@ -14,7 +14,7 @@ from numba.extending import overload
 from sequential.kernels.call import inlined, owning
 from sequential.kernels.records import ModelTables
 
-__all__ = ["ANY_SIZE", "known", "reading_dim", "sized"]
+__all__ = ["ANY_SIZE", "known", "reading_dim", "reading_size", "sized"]
 
 ANY_SIZE = types.Tuple(())
 
@@ -39,7 +39,7 @@ def sized(model, storage, tangent, reading):
         model.table, known(storage, model.n), known(tangent, model.d), model.step, model.jacobian,
         model.noise, model.advance, model.carry, model.params, model.observe, model.observe_jacobian,
         model.sensor_params, model.sensor_params_at, model.z_table, model.z_first, model.z_size, model.z_dim,
-        model.gate, model.loss, model.loss_k, model.flat, model.z_flat, known(reading, 0),
+        model.gate, model.loss, model.loss_k, model.flat, model.z_flat, known(reading, 0), model.see,
     )  # fmt: skip
 
 
@@ -47,3 +47,9 @@ def sized(model, storage, tangent, reading):
 def reading_dim(model, s):
     """Tangent of a measurement of sensor s."""
     return model.m if model.m != 0 else model.z_dim[s]
+
+
+@inlined
+def reading_size(model, s, m):
+    """Storage of a measurement of sensor s, which is m where its tangents simply add."""
+    return m if model.z_flat[s] != 0 else model.z_size[s]

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit, types
 
 from sequential.kernels.arrays import f1, f2
-from sequential.kernels.belief import LOG_TWO_PI, admit
+from sequential.kernels.belief import LOG_TWO_PI, admit, tallied
 from sequential.kernels.bierman import BIERMAN_VECTORS, update_covariance_ud
 from sequential.kernels.call import bare, call, inlined
 from sequential.kernels.correcting import DOUBTFUL
@@ -33,25 +33,26 @@ from sequential.kernels.sigma_points import (
     tangent_to,
     unexplained,
 )
-from sequential.kernels.sizes import ANY_SIZE, reading_dim, sized
+from sequential.kernels.sizes import ANY_SIZE, reading_dim, reading_size, sized
 
 __all__ = ["filter_sigma_points"]
 
 
 @inlined
-def predict(model, plan, node, x, p, phi, weights, unit, keep, sigma, work):
+def predict(model, plan, node, x, p, phi, count, weights, unit, keep, sigma, work):
     """Carry mean, covariance and (with `keep`) phi along the steps to a node; False where P is indefinite."""
-    points, moved, tangents, steps, lower, move = sigma
+    points, moved, tangents, steps, lower, move, before, after = sigma
     n, d, blocks, width = model.n, model.d, len(model.table), plan.inputs.shape[1]
-    before, after = points.reshape(-1), moved.reshape(-1)
     for s in range(plan.step_ptr[node], plan.step_ptr[node + 1]):
         u, dt = plan.step_input[s] * width, plan.step_dt[s]
         if not factor(p, d, lower):
             return False
-        count = place(model.table, n, d, x, lower, weights, unit, steps, points)
+        place(model.flat, model.table, n, d, count, x, lower, weights, unit, steps, points, before)
         for i in range(count + 1):
             call(model.step, before, i * n, plan.inputs, u, dt, model.params, 0, after, i * n)
-        mean_of(model.table, 0, blocks, n, d, count, moved, weights, x, tangents, move)
+        mean_of(
+            model.flat, model.table, 0, blocks, n, d, count, moved, weights, x, tangents, move, after
+        )  # fmt: skip
         second_moment(tangents, weights, count, d, p)
         call(model.noise, before, 0, plan.inputs, u, dt, model.params, 0, p, 0)
         if keep != 0:
@@ -63,25 +64,29 @@ def predict(model, plan, node, x, p, phi, weights, unit, keep, sigma, work):
 
 
 @inlined
-def look(model, plan, reading, x, p, weights, unit, sigma, seen):
+def look(model, plan, reading, x, p, count, weights, unit, sigma, seen):
     """Regress a reading on the state: residual, D (m, d), D Dᵀ + Ω and Ω; False where P is indefinite."""
-    points, _, _, steps, lower, _ = sigma
-    images, tangents, expected, residual, move, projected, moment, rest = seen
+    points, _, _, steps, lower, _, before, _ = sigma
+    images, tangents, expected, residual, move, projected, moment, rest, after = seen
     s = plan.sensor[reading]
     m, n, d = reading_dim(model, s), model.n, model.d
     width, wide = plan.context.shape[1], images.shape[1]
     first, last, at = model.z_first[s], model.z_first[s + 1], model.sensor_params_at[s]
     if not factor(p, d, lower):
         return False
-    count = place(model.table, n, d, x, lower, weights, unit, steps, points)
-    before, after = points.reshape(-1), images.reshape(-1)
+    place(model.flat, model.table, n, d, count, x, lower, weights, unit, steps, points, before)
     for i in range(count + 1):
         call(
             model.observe[s], before, i * n, plan.context, reading * width, 0.0,
             model.sensor_params, at, after, i * wide,
         )  # fmt: skip
-    mean_of(model.z_table, first, last, model.z_size[s], m, count, images, weights, expected, tangents, move)
-    tangent_to(model.z_table, first, last, expected, plan.z_flat, reading * plan.z.shape[1], residual)
+    flat, size = model.z_flat[s], reading_size(model, s, m)
+    mean_of(
+        flat, model.z_table, first, last, size, m, count, images, weights, expected, tangents, move, after
+    )  # fmt: skip
+    tangent_to(
+        flat, model.z_table, first, last, m, expected, plan.z_flat, reading * plan.z.shape[1], residual
+    )  # fmt: skip
     if plan.rows[reading] < m:
         for a in range(m):
             if math.isnan(plan.z[reading, a]):
@@ -102,9 +107,9 @@ def look(model, plan, reading, x, p, weights, unit, sigma, seen):
 
 @inlined
 def gain_of(moment, given, share, lower, projected, residual, m, d, innovation_cov, factored, gain, white):
-    """S = moment + share R and Kᵀ = S⁻¹ D Lᵀ in `gain`; (NIS, log det S), NIS negative if S is in doubt.
+    """S = moment + share R and Kᵀ = S⁻¹ D Lᵀ in `gain`; (NIS, a, b), NIS negative if S is in doubt.
 
-    The diagonal of the factor holds inverses: one division a row.
+    log det S = a + log b.  The diagonal of the factor holds inverses: one division a row.
     """
     nis, log_det, determinant = 0.0, 0.0, 1.0
     for i in range(m):
@@ -122,11 +127,8 @@ def gain_of(moment, given, share, lower, projected, residual, m, d, innovation_c
         for k in range(i):
             t -= factored[i, k] * factored[i, k]
         if not t > DOUBTFUL * innovation_cov[i, i]:
-            return -1.0, 0.0
-        determinant *= t
-        if not 1e-200 < determinant < 1e200:
-            log_det += math.log(determinant)
-            determinant = 1.0
+            return -1.0, 0.0, 1.0
+        log_det, determinant = tallied(log_det, determinant * t)
         inverse = 1.0 / math.sqrt(t)
         factored[i, i] = inverse
         white[i] = s * inverse
@@ -144,7 +146,7 @@ def gain_of(moment, given, share, lower, projected, residual, m, d, innovation_c
             for k in range(i + 1, m):
                 t -= factored[k, i] * gain[k, j]
             gain[i, j] = t * factored[i, i]
-    return nis, log_det + math.log(determinant)
+    return nis, log_det, determinant
 
 
 @inlined
@@ -190,23 +192,27 @@ def redo(p, lower, projected, rest, given, share, residual, m, d, updated, delta
 
 
 @inlined
-def absorb(model, plan, reading, x, p, weights, unit, sigma, seen, update, out):
-    """Update by one reading; returns its log likelihood, 0 if gated, NaN if S or P is indefinite."""
+def absorb(model, plan, reading, x, p, count, weights, unit, sigma, seen, update, out):
+    """Update by one reading; (a, b) where its log likelihood is a - ½ log b.
+
+    That is (0, 1) if it was gated; a is NaN if S or P is indefinite.
+    """
     gain, innovation_cov, factored, white, left, scaled, delta, doubt = update
     lower, residual, projected, moment, rest = sigma[4], seen[3], seen[5], seen[6], seen[7]
     s, given = plan.sensor[reading], plan.noise_cov[plan.noise_row[reading]]
     m, d, rows = reading_dim(model, s), model.d, plan.rows[reading]
-    if not look(model, plan, reading, x, p, weights, unit, sigma, seen):
-        return math.nan
-    nis, log_det = gain_of(
+    if not look(model, plan, reading, x, p, count, weights, unit, sigma, seen):
+        return math.nan, 1.0
+    nis, log_det, determinant = gain_of(
         moment, given, 1.0, lower, projected, residual, m, d, innovation_cov, factored, gain, white
     )
     redone = nis < 0.0
     if redone:
+        determinant = 1.0
         nis, log_det = redo(p, lower, projected, rest, given, 1.0, residual, m, d, left, delta, doubt)
     verdict = admit(model, plan, reading, nis, residual, innovation_cov, out)
     if verdict < 1:
-        return math.nan if verdict < 0 else 0.0
+        return math.nan if verdict < 0 else 0.0, 1.0
     share = 1.0
     if model.loss[s] != 0:
         share = 1.0 / loss_weight(model.loss[s], model.loss_k[s], nis / rows)
@@ -218,19 +224,19 @@ def absorb(model, plan, reading, x, p, weights, unit, sigma, seen, update, out):
         copy_matrix(left, p)
     else:
         correct(p, lower, projected, rest, given, share, gain, residual, m, d, left, scaled, delta)
-    shift(model.table, 0, len(model.table), x, delta)
-    return -0.5 * (nis + log_det + rows * LOG_TWO_PI)
+    shift(model.flat, model.table, 0, len(model.table), model.n, x, delta)
+    return -0.5 * (nis + log_det + rows * LOG_TWO_PI), determinant
 
 
 @inlined
-def filter_nodes(model, plan, x, p, phi, weights, unit, keep, sigma, seen, update, work, out):
+def filter_nodes(model, plan, x, p, phi, count, weights, unit, keep, sigma, seen, update, work, out):
     """The loop of `filter_sigma_points`, with every array at hand."""
-    log_likelihood = 0.0
+    log_likelihood, logarithm, product = 0.0, 0.0, 1.0
     for node in range(len(plan.reading_ptr) - 1):
         failed = -1
         if keep != 0:
             fill_diagonal(phi, 1.0)
-        if not predict(model, plan, node, x, p, phi, weights, unit, keep, sigma, work):
+        if not predict(model, plan, node, x, p, phi, count, weights, unit, keep, sigma, work):
             failed = -2 - node
         if keep != 0:
             copy_vector(x, out.predicted_mean[node])
@@ -239,19 +245,24 @@ def filter_nodes(model, plan, x, p, phi, weights, unit, keep, sigma, seen, updat
         for reading in range(plan.reading_ptr[node], plan.reading_ptr[node + 1]):
             if failed != -1:
                 break
-            gained = absorb(model, plan, reading, x, p, weights, unit, sigma, seen, update, out)
+            gained, share = absorb(
+                model, plan, reading, x, p, count, weights, unit, sigma, seen, update, out
+            )  # fmt: skip
             if math.isnan(gained):
                 failed = reading
             log_likelihood += gained
+            logarithm, product = tallied(logarithm, product * share)
         copy_vector(x, out.mean[node])
         copy_matrix(p, out.cov[node])
         if failed != -1:
             return log_likelihood, failed
-    return log_likelihood, -1
+    return log_likelihood - 0.5 * (logarithm + math.log(product)), -1
 
 
 @njit(
-    FINISHED(MODEL, SCHEDULE, f1, f2, f1, f2, types.int64, FILTERED, ANY_SIZE, ANY_SIZE, ANY_SIZE),
+    FINISHED(
+        MODEL, SCHEDULE, f1, f2, f1, f2, types.int64, FILTERED, ANY_SIZE, ANY_SIZE, ANY_SIZE
+    ),
     cache=True, error_model="numpy", nogil=True,
 )  # fmt: skip
 def filter_sigma_points(
@@ -263,14 +274,15 @@ def filter_sigma_points(
     where P was not on the way to node k.  The last three arguments are sizes, as in `kernels.sizes`.
     """
     n, d, widest = model.n, model.d, plan.z.shape[1]
-    count = 1 + (2 * d if unit.shape[0] == 0 else unit.shape[0])
+    count = 2 * d if unit.shape[0] == 0 else unit.shape[0]
+    points, moved, images = np.empty((count + 1, n)), np.empty((count + 1, n)), np.empty((count + 1, widest))
     sigma = (
-        np.empty((count, n)), np.empty((count, n)), np.empty((count, d)), np.empty((count, d)),
-        np.zeros((d, d)), np.empty(d),
+        points, moved, np.empty((count + 1, d)), np.empty((count, d)), np.zeros((d, d)), np.empty(d),
+        points.reshape(-1), moved.reshape(-1),
     )  # fmt: skip
     seen = (
-        np.empty((count, widest)), np.empty((count, widest)), np.empty(widest), np.empty(widest),
-        np.empty(widest), np.empty((widest, d)), np.empty((widest, widest)), np.empty((widest, widest)),
+        images, np.empty((count + 1, widest)), np.empty(widest), np.empty(widest), np.empty(widest),
+        np.empty((widest, d)), np.empty((widest, widest)), np.empty((widest, widest)), images.reshape(-1),
     )  # fmt: skip
     update = (
         np.empty((widest, d)), np.empty((widest, widest)), np.empty((widest, widest)), np.empty(widest),
@@ -283,5 +295,5 @@ def filter_sigma_points(
     work = (np.empty((d, d)), np.empty((d, d)))
     return filter_nodes(
         sized(model, storage, tangent, reading), plan, prior_mean.copy(), prior_cov.copy(), np.eye(d),
-        weights, unit, keep, sigma, seen, update, work, out,
+        count, weights, unit, keep, sigma, seen, update, work, out,
     )  # fmt: skip
