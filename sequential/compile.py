@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError
-from sequential.fusing import fused_move, fused_sight
+from sequential.fusing import fused_move, fused_sight, over_points
 from sequential.manifold import Kind, Manifold
 from sequential.model import Functions, Plain, StateSpace, evaluate
+from sequential.models.declared import density_noise
 from sequential.timeline import sealed
 from sequential.wrapping import wrapped
 
@@ -38,6 +39,7 @@ class Compiled:
     interpreted: list[str] = field(default_factory=list)
     alive: list[Any] = field(default_factory=list)
     failures: list[BaseException] = field(default_factory=list)
+    pointed: dict[tuple[int, int], Any] = field(default_factory=dict)
 
     def raise_failures(self) -> None:
         """Raise what an interpreted model function raised while a kernel called it."""
@@ -45,6 +47,22 @@ class Compiled:
             first = self.failures[0]
             self.failures.clear()
             raise first
+
+    def with_points(self, model: StateSpace, count: int, widest: int) -> Any:
+        """The tables with functions that take all of `count` sigma points at once, where there can be some.
+
+        `widest` is how many numbers lie between one point's measurement and the next one's.
+        """
+        if (count, widest) not in self.pointed:
+            n, f = model.manifold.size, model.process_functions
+            step = _fused(self, over_points, f.value, n, f.inputs, count, n)
+            sight = [
+                _fused(self, over_points, g.value, n, g.inputs, count, widest)
+                for g in model.sensor_functions.values()
+            ]
+            more = {"step_points": step, "observe_points": sealed(_ints(sight))}
+            self.pointed[count, widest] = self.tables._replace(**more)
+        return self.pointed[count, widest]
 
     def message(self) -> str:
         """What interpreting costs, or nothing."""
@@ -100,7 +118,7 @@ def _lower(model: StateSpace) -> Compiled:
         _ints([s.loss.code if s.loss else 0 for s in sensors]),
         np.array([s.loss.k if s.loss else 0.0 for s in sensors]),
         _flatness(model.manifold), _ints([_flatness(s.manifold) for s in sensors]), 0,
-        _ints(see),
+        _ints(see), 0, _ints([0] * len(sensors)),
     )  # fmt: skip
     whole.tables = ModelTables._make(sealed(v) if isinstance(v, np.ndarray) else v for v in entries)
     return whole
@@ -147,17 +165,14 @@ def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: 
     return int(made.address)
 
 
-def _fused(whole: Compiled, fuse: Callable[..., Any], value: Any, jacobian: Any, *rest: Any) -> int:
-    """Address of a function made of several of a user's, 0 where they do not lend themselves to it."""
-    taken = [raw for raw in (value, jacobian, *rest) if isinstance(raw, Plain)]
-    if (
-        value not in taken
-        or jacobian not in taken
-        or not all(isinstance(r.function, Hashable) for r in taken)
-    ):
+def _fused(whole: Compiled, fuse: Callable[..., Any], *given: Any) -> int:
+    """Address of a function made of a user's functions, 0 where they do not lend themselves to it."""
+    raws = [raw for raw in given if callable(raw) or raw is None]
+    taken = [raw for raw in raws if isinstance(raw, Plain) and isinstance(raw.function, Hashable)]
+    if len(taken) < len(raws) - (density_noise in raws):
         return 0
     try:
-        made = fuse(value, jacobian, *rest)
+        made = fuse(*given)
     except Exception:  # noqa: BLE001 - where Numba refuses, each function is called by itself
         return 0
     whole.alive.append(made)

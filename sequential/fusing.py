@@ -14,7 +14,7 @@ from sequential.model import Plain
 from sequential.models.declared import density_noise
 from sequential.wrapping import jitted, places, try_once
 
-__all__ = ["fused_move", "fused_sight"]
+__all__ = ["fused_move", "fused_sight", "over_points"]
 
 LARGEST = 6  # tangent directions up to which the products are written out
 # Products with zero may be left out, and sums with it: NaN and the sign of zero need not survive.
@@ -43,7 +43,7 @@ def fused_move(step: Plain, jacobian: Plain, noise: Any, n: int, d: int, inputs:
     lines += pushed(f, q, n, d)
     lines += [f"out[{i}] = {place}" for i, place in enumerate(after)]
     lines += [f"out[{n + i * d + j}] = s{max(i, j)}{min(i, j)}" for i in range(d) for j in range(d)]
-    return made(lines, n, inputs, {"step": step, "jacobian": jacobian, "noise": noise})
+    return made(lines, (n,), inputs, {"step": step, "jacobian": jacobian, "noise": noise})
 
 
 @lru_cache(maxsize=256)
@@ -55,7 +55,18 @@ def fused_sight(observe: Plain, jacobian: Plain, n: int, inputs: int) -> Any:
         return None
     lines = [f"seen = observe({given(observe)})", f"h = jacobian({given(jacobian)})"]
     lines += [f"out[{i}] = {place}" for i, place in enumerate([*seen, *h])]
-    return made(lines, n, inputs, {"observe": observe, "jacobian": jacobian})
+    return made(lines, (n,), inputs, {"observe": observe, "jacobian": jacobian})
+
+
+@lru_cache(maxsize=256)
+def over_points(raw: Plain, n: int, inputs: int, count: int, stride: int) -> Any:
+    """A function that takes `count` states at once, and writes each result `stride` numbers on."""
+    found = written(raw, "value", raw.size, n, inputs)
+    if found is None:
+        return None
+    lines = [f"for k in range({count}):", "    x = states[k]", f"    value = function({given(raw)})"]
+    lines += [f"    out[k * {stride} + {i}] = {place}" for i, place in enumerate(found)]
+    return made(lines, (count, n), inputs, {"function": raw})
 
 
 def written(raw: Plain, name: str, size: int, n: int, inputs: int) -> list[str] | None:
@@ -87,13 +98,14 @@ def pushed(f: list[str], q: list[str], n: int, d: int) -> list[str]:
     return lines
 
 
-def made(lines: list[str], n: int, inputs: int, functions: dict[str, Any]) -> Any:
-    """The lines as a C function in the kernels' calling convention."""
+def made(lines: list[str], shape: tuple[int, ...], inputs: int, functions: dict[str, Any]) -> Any:
+    """The lines as a C function in the kernels' calling convention, given one state x or several `states`."""
     from numba import carray, cfunc
 
     from sequential.kernels.call import MODEL_SIGNATURE
 
-    head = f"def fused(state, context, dt, p, out):\n    x = carray(state, ({n},))\n"
+    name = "x" if len(shape) == 1 else "states"
+    head = f"def fused(state, context, dt, p, out):\n    {name} = carray(state, {shape})\n"
     head += f"    u = carray(context, ({inputs},))\n"
     scope: dict[str, Any] = {"carray": carray}
     for name, raw in functions.items():

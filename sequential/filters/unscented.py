@@ -109,8 +109,9 @@ def filter_points(
     sizes = sizes_of(whole.tables, "unscented", specialise=specialise)
     kernel = made_for(filter_sigma_points) if any(sizes) else filter_sigma_points
     began = time.perf_counter()
+    tables = whole.with_points(problem.model, 1 + (len(unit) or 2 * d), problem.schedule.z.shape[1])
     log_likelihood, failed = kernel(
-        whole.tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out,
+        tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out,
         *sizes,
     )  # fmt: skip
     seconds = time.perf_counter() - began

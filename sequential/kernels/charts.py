@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import types
 from numba.extending import register_jitable
 
@@ -40,7 +41,7 @@ def unwind(angle):
     """Angle in ]-π, π] of one that is not there."""
     if not abs(angle) < FAR:
         return math.atan2(math.sin(angle), math.cos(angle))
-    turns = math.floor(angle / (2.0 * math.pi) + 0.5)
+    turns = np.floor(angle * (0.5 / math.pi) + 0.5)
     left = (angle - turns * TURN) - turns * TURN_REST
     if left > math.pi:
         left -= 2.0 * math.pi

@@ -82,7 +82,9 @@ def absorb(model, plan, reading, x, p, iterations, update, work, expected, resid
     if verdict < 1:
         return math.nan if verdict < 0 else 0.0, 1.0
     gained = -0.5 * (nis + plan.rows[reading] * LOG_TWO_PI) - log_det
-    weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
+    weight = 1.0
+    if model.loss[s] != 0:
+        weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
     if weight < 1.0:
         redone = correct(p, h, noise, weight, residual, m, d, update)[3]
     if iterations > 1:

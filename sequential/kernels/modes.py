@@ -49,6 +49,7 @@ def mode_of(base, modes, j, gate):
         modes.observe_jacobian[j], modes.sensor_params[j], modes.sensor_params_at[j], base.z_table,
         base.z_first, base.z_size, base.z_dim, gate, modes.loss[j], modes.loss_k[j],
         base.flat, base.z_flat, base.m, modes.see[j],
+        0, base.observe_points,
     )  # fmt: skip
 
 

@@ -39,6 +39,8 @@ class ModelTables(NamedTuple):
     z_flat: Any  # (S,) the same for measurements
     m: int  # tangent of every measurement in a kernel made for one size, else 0
     see: Any  # (S,) addresses of sensors that write their Jacobian behind the measurement, or 0
+    step_points: int  # address of a step, and
+    observe_points: Any  # (S,) of sensors, that take all sigma points at once, or 0
 
 
 _int = types.int64
@@ -64,6 +66,8 @@ MODEL = types.NamedTuple(
         f2,
         i1,
         f1,
+        _int,
+        i1,
         _int,
         i1,
         _int,

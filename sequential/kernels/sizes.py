@@ -40,6 +40,7 @@ def sized(model, storage, tangent, reading):
         model.noise, model.advance, model.carry, model.params, model.observe, model.observe_jacobian,
         model.sensor_params, model.sensor_params_at, model.z_table, model.z_first, model.z_size, model.z_dim,
         model.gate, model.loss, model.loss_k, model.flat, model.z_flat, known(reading, 0), model.see,
+        model.step_points, model.observe_points,
     )  # fmt: skip
 
 

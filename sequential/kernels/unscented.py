@@ -48,8 +48,11 @@ def predict(model, plan, node, x, p, phi, count, weights, unit, keep, sigma, wor
         if not factor(p, d, lower):
             return False
         place(model.flat, model.table, n, d, count, x, lower, weights, unit, steps, points, before)
-        for i in range(count + 1):
-            call(model.step, before, i * n, plan.inputs, u, dt, model.params, 0, after, i * n)
+        if model.step_points != 0:
+            call(model.step_points, before, 0, plan.inputs, u, dt, model.params, 0, after, 0)
+        else:
+            for i in range(count + 1):
+                call(model.step, before, i * n, plan.inputs, u, dt, model.params, 0, after, i * n)
         mean_of(
             model.flat, model.table, 0, blocks, n, d, count, moved, weights, x, tangents, move, after
         )  # fmt: skip
@@ -75,11 +78,14 @@ def look(model, plan, reading, x, p, count, weights, unit, sigma, seen):
     if not factor(p, d, lower):
         return False
     place(model.flat, model.table, n, d, count, x, lower, weights, unit, steps, points, before)
-    for i in range(count + 1):
-        call(
-            model.observe[s], before, i * n, plan.context, reading * width, 0.0,
-            model.sensor_params, at, after, i * wide,
-        )  # fmt: skip
+    context, params = reading * width, model.sensor_params
+    if model.observe_points[s] != 0:
+        call(model.observe_points[s], before, 0, plan.context, context, 0.0, params, at, after, 0)
+    else:
+        for i in range(count + 1):
+            call(
+                model.observe[s], before, i * n, plan.context, context, 0.0, params, at, after, i * wide
+            )  # fmt: skip
     flat, size = model.z_flat[s], reading_size(model, s, m)
     mean_of(
         flat, model.z_table, first, last, size, m, count, images, weights, expected, tangents, move, after

@@ -7,7 +7,7 @@ import pytest
 
 import sequential as sq
 from sequential.compile import compiled
-from sequential.fusing import fused_move, fused_sight
+from sequential.fusing import fused_move, fused_sight, over_points
 from sequential.kernels.charts import wrap
 from sequential.model import Plain, evaluate
 from sequential.models.declared import density_noise
@@ -67,6 +67,13 @@ def test_a_fused_sight_is_the_measurement_and_behind_it_its_jacobian(rng):
     x, none, out = rng.standard_normal(3), np.zeros(1), np.empty(8)
     sight.ctypes(pointer(x), pointer(none), 0.0, pointer(none), pointer(out))
     np.testing.assert_allclose(out, [*ranges(x), *np.ravel(ranges_jacobian(x))], rtol=1e-14)
+
+
+def test_all_sigma_points_at_once_are_each_of_them_alone(rng):
+    many = over_points(STEP, 3, 2, 5, 3)
+    x, u, out = rng.standard_normal((5, 3)), rng.standard_normal(2), np.empty((5, 3))
+    many.ctypes(pointer(x), pointer(u), 0.1, pointer(u), pointer(out))
+    np.testing.assert_allclose(out, [step(one, u, 0.1) for one in x], rtol=1e-14)
 
 
 def test_what_returns_arrays_writes_to_its_arguments_or_is_large_stays_apart():
