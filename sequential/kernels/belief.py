@@ -28,12 +28,12 @@ def tallied(logarithm, product):
 
 
 @inlined_as(TRIPLE(f2, f2, f2, f0, f1, i0, i0, w2, w2, w2, w2, w1))
-def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain, white):
+def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, lower, cross, gain, left):
     """S = H P Hᵀ + R/w, K = P Hᵀ S⁻¹, with the NIS, which is negative if S is not positive definite.
 
-    Returns (NIS, a, b) where log det S = 2 (a + log b): logarithms are dear, and those of many readings can
-    be one.  `gain` holds Kᵀ (m, d), `lower` the Cholesky factor of S with the inverses of its diagonal,
-    `cross` H P, `white` the whitened residual.
+    Returns (NIS, a, b) where log det S = a + log b: logarithms are dear, and those of many readings can be
+    one.  S = L D Lᵀ without square roots: `lower` holds L below its diagonal and D⁻¹ on it, `gain` Kᵀ (m, d),
+    `cross` H P, `left` L⁻¹ residual.
     """
     share = 1.0 / weight
     multiply(h, p, cross, m, d, d)
@@ -44,35 +44,34 @@ def gain_and_innovation(p, h, noise, weight, residual, m, d, innovation_cov, low
     symmetrise(innovation_cov, m)
     nis, log_det, determinant = 0.0, 0.0, 1.0
     for i in range(m):
-        s = residual[i]
+        s, pivot = residual[i], innovation_cov[i, i]
         for j in range(i):
             t = innovation_cov[i, j]
             for k in range(j):
                 t -= lower[i, k] * lower[j, k]
-            lower[i, j] = t * lower[j, j]
-            s -= lower[i, j] * white[j]
-        t = innovation_cov[i, i]
-        for k in range(i):
-            t -= lower[i, k] * lower[i, k]
-        if not t > TINY * innovation_cov[i, i]:
+            lower[i, j] = t  # times D until its row is done
+        for j in range(i):
+            t = lower[i, j] * lower[j, j]
+            pivot -= t * lower[i, j]
+            lower[i, j] = t
+            s -= t * left[j]
+        if not pivot > TINY * innovation_cov[i, i]:
             return -1.0, 0.0, 1.0
-        pivot = math.sqrt(t)
         inverse = 1.0 / pivot
-        lower[i, i] = inverse
-        white[i] = s * inverse
-        nis += white[i] * white[i]
+        lower[i, i], left[i] = inverse, s
+        nis += s * s * inverse
         log_det, determinant = tallied(log_det, determinant * pivot)
         for j in range(d):
             t = cross[i, j]
             for k in range(i):
                 t -= lower[i, k] * gain[k, j]
-            gain[i, j] = t * inverse
+            gain[i, j] = t
     for i in range(m - 1, -1, -1):
         for j in range(d):
-            t = gain[i, j]
+            t = gain[i, j] * lower[i, i]
             for k in range(i + 1, m):
                 t -= lower[k, i] * gain[k, j]
-            gain[i, j] = t * lower[i, i]
+            gain[i, j] = t
     return nis, log_det, determinant
 
 

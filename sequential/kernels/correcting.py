@@ -53,7 +53,7 @@ def doubtful(innovation_cov, lower, m):
     """Whether a pivot of S has kept too few digits."""
     found = False
     for i in range(m):
-        found = found or not DOUBTFUL * innovation_cov[i, i] * lower[i, i] * lower[i, i] < 1.0
+        found = found or not DOUBTFUL * innovation_cov[i, i] * lower[i, i] < 1.0
     return found
 
 
@@ -61,7 +61,7 @@ def doubtful(innovation_cov, lower, m):
 def correct(p, h, noise, weight, residual, m, d, update):
     """K·residual into `delta`; returns (NIS, a, b, whether it had to be redone), NIS -1 for an S < 0.
 
-    log det S = 2 (a + log b), as in `gain_and_innovation`.
+    log det S = a + log b, as in `gain_and_innovation`.
     """
     cross, gain, innovation_cov, lower, delta = update[2], update[3], update[4], update[5], update[7]
     nis, log_det, determinant = gain_and_innovation(
@@ -69,7 +69,7 @@ def correct(p, h, noise, weight, residual, m, d, update):
     )
     if nis < 0.0 or doubtful(innovation_cov, lower, m):
         nis, log_det = redo(p, h, noise, weight, residual, m, d, update[9], delta, update[10])
-        return nis, 0.5 * log_det, 1.0, True
+        return nis, log_det, 1.0, True
     for i in range(d):
         delta[i] = 0.0
     add_correction(gain, residual, m, d, delta)

@@ -68,7 +68,7 @@ def iterate(model, plan, reading, x, p, weight, iterations, update, work, expect
 
 @inlined
 def absorb(model, plan, reading, x, p, iterations, update, work, expected, residual, out):
-    """Update the belief by one reading; (a, b) where its log likelihood is a - log b.
+    """Update the belief by one reading; (a, b) where its log likelihood is a - ½ log b.
 
     That is (0, 1) if it was gated; a is NaN if S is indefinite.
     """
@@ -81,7 +81,7 @@ def absorb(model, plan, reading, x, p, iterations, update, work, expected, resid
     verdict = admit(model, plan, reading, nis, residual, update[4], out)
     if verdict < 1:
         return math.nan if verdict < 0 else 0.0, 1.0
-    gained = -0.5 * (nis + plan.rows[reading] * LOG_TWO_PI) - log_det
+    gained = -0.5 * (nis + log_det + plan.rows[reading] * LOG_TWO_PI)
     weight = 1.0
     if model.loss[s] != 0:
         weight = loss_weight(model.loss[s], model.loss_k[s], nis / plan.rows[reading])
@@ -119,7 +119,7 @@ def filter_nodes(model, plan, belief, x, p, phi, iterations, work, update, expec
             logarithm, product = tallied(logarithm, product * share)
         copy_vector(x, out.mean[node])
         copy_matrix(p, out.cov[node])
-    return log_likelihood - logarithm - math.log(product), -1
+    return log_likelihood - 0.5 * (logarithm + math.log(product)), -1
 
 
 @allocating

@@ -100,7 +100,7 @@ def judge(base, modes, plan, reading, beliefs, mu, gained, iterations, scratch, 
         )  # fmt: skip
         if math.isnan(gained[j]):
             return math.nan
-        gained[j] -= math.log(share)
+        gained[j] -= 0.5 * math.log(share)
     combine_innovation(base, plan, reading, mu, out, residual, residual_cov)
     if not taken:
         return 0.0

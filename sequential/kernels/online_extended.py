@@ -39,7 +39,7 @@ def extended_step(address, dt, sensor, belief, z, u, context, noise, out):
     log_likelihood = 0.0
     if plan.reading_ptr[1] > 0:
         gained, share = absorb(model, plan, 0, x, p, iterations, update, work, expected, residual, filtered)
-        log_likelihood = gained - math.log(share)
+        log_likelihood = gained - 0.5 * math.log(share)
     for i in range(size):
         out[i] = both[i]
     return report(model, filtered, size, log_likelihood, out)
