@@ -42,11 +42,11 @@ def allocate(problem: Problem, tables: Any, *, keep: bool) -> tuple[Any, ...]:
 def cut(shapes: tuple[tuple[int, ...], ...]) -> list[NDArray[np.float64]]:
     """Arrays of these shapes, not filled, side by side in one block."""
     sizes = [math.prod(shape) for shape in shapes]
-    block = np.empty(sum(sizes))
-    ends = np.cumsum(sizes)
-    return [
-        block[end - size : end].reshape(shape) for size, end, shape in zip(sizes, ends, shapes, strict=True)
-    ]
+    block, pieces, end = np.empty(sum(sizes)), [], 0
+    for size, shape in zip(sizes, shapes, strict=True):
+        pieces.append(block[end : end + size].reshape(shape))
+        end += size
+    return pieces
 
 
 def require_solved(problem: Problem, failed: int, filtered: Any = None) -> None:
@@ -120,7 +120,7 @@ def masked(
 ) -> NDArray[np.float64]:
     """Residuals (R, m) of some readings, NaN where a component is missing."""
     m = residual.shape[1]
-    if (problem.schedule.rows[readings] == m).all():
+    if problem.plain or (problem.schedule.rows[readings] == m).all():
         return residual
     return np.where(np.isnan(problem.schedule.z[readings, :m]), np.nan, residual)
 
@@ -156,6 +156,6 @@ def finished(
     whole.raise_failures()
     require_solved(problem, failed, out)
     require_finite(problem, out.mean)
-    rejected = int((out.accepted == 0).sum())
+    rejected = len(out.accepted) - int(np.count_nonzero(out.accepted))
     report = Report(name, seconds=seconds, message=whole.message(), rejected=rejected)
     return as_run(problem, out, log_likelihood, report, keep=keep)
