@@ -152,7 +152,7 @@ def _logs(options: dict[str, Any]) -> list[ImuRecording]:
 
 def _read(source: str, options: dict[str, Any]) -> ImuRecording:
     chosen = {name: options[name] for name in ("kind", "units", "columns", "rate")}
-    return opened(source, **chosen)[0].recording
+    return opened(source, only=("accel", "gyro"), **chosen)[0].recording
 
 
 def _deliver(done: Calibrated, what: str, options: dict[str, Any]) -> int:

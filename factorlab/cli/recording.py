@@ -35,7 +35,7 @@ def recording_options(command: Command) -> Command:
 
 
 def opened(
-    source: str, *, usable: bool = True, **options: Any
+    source: str, *, usable: bool = True, only: tuple[str, ...] | None = None, **options: Any
 ) -> tuple[OpenedRecording, tuple[Finding, ...]]:
     """Open a recording and say on stderr what is wrong with it.
 
@@ -43,6 +43,7 @@ def opened(
     ----------
     source : a path, or SET:PART as in `broad:07`
     usable : raise where a finding is a failure
+    only : the sensors that count, of accel, gyro and mag; what is wrong with others stops nothing
     options : kind, units, columns and rate, as the options of `recording_options` give them
 
     Raises
@@ -50,11 +51,18 @@ def opened(
     DataError
         where the recording cannot be read, or would give wrong results.
     """
+    from dataclasses import replace
+
     from factorlab.datasets.recordings import open_recording
     from sequential.sensors.health import failures, inspect
 
     found = open_recording(source, **options)
-    findings = inspect(found.recording)
+    recording = found.recording
+    if only is not None:
+        left_out = {sensor: None for sensor in recording.sensors if sensor not in only}
+        if len(left_out) < len(recording.sensors):
+            recording = replace(recording, **left_out)
+    findings = inspect(recording)
     for finding in findings:
         if finding.severity != "fail" or not usable:
             click.echo(f"{finding.severity}: {finding}", err=True)

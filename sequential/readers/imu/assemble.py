@@ -191,6 +191,11 @@ def _require_gravity(channels: Channels, accel: Array, rate: float) -> None:
     """Refuse an accelerometer from which gravity was taken away."""
     level = level_at_rest(accel, rate)
     usual = float(np.median(np.linalg.norm(accel, axis=1)))
+    if 0.8 < level < 1.25 and 0.8 < usual < 1.25:
+        raise FileFormatError(
+            f"{channels.where}: the accelerometer shows {level:.3f} at rest, so it is in g, not in m/s² as "
+            "the file (or the option) says; give units accel=g"
+        )
     if max(level, usual) < FREE_FALL * GRAVITY:
         raise FileFormatError(
             f"{channels.where}: the accelerometer shows {level:.3g} m/s² at rest, so gravity was taken "

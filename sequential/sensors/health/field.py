@@ -50,4 +50,4 @@ def _constant(recording: ImuRecording) -> Finding:
         turned = float(np.ptp(np.cumsum(free * recording.dt[:, None], axis=0), axis=0).max())
     if recording.gyro is not None and turned < TURNED:
         return Finding("warn", what, do="nothing turned, so it may be right; turn it once to see")
-    return Finding("fail", what, do="leave it out (mag=None): a heading from it would be wrong")
+    return Finding("fail", what, do="leave it out (mag=None, --no-mag): a heading from it would be wrong")
