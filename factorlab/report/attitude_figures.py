@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from factorlab.report.style import blank, legend_below, thin
 from sequential.attitude import roll_pitch_yaw
 from sequential.evaluate import attitude_error
-from sequential.manifold.quaternion import quaternion_multiply
+from sequential.manifold.quaternion import quaternion_multiply, rotation_matrix
 
 if TYPE_CHECKING:
     from factorlab.attitude import Reference, Solved
@@ -107,19 +107,22 @@ def moments(solved: tuple[Solved, ...], reference: Reference | None) -> Figure |
 
 
 def errors(solved: tuple[Solved, ...]) -> Figure | None:
-    """Heading and inclination errors against the truth, with the 2σ that the first estimator declares."""
+    """Heading and inclination errors against the truth, and the 95 % bounds that the first declares."""
     judged = [one for one in solved if one.error is not None]
     if not judged:
         return None
     figure, axes = blank(4.6, 2, 1, sharex=True)
     rows = thin(len(judged[0].history))
-    t = judged[0].history.seconds[rows]
+    t, bounds = judged[0].history.seconds[rows], _bounds(judged[0], rows)
     for axis, part, label in ((axes[0, 0], 1, "heading error, °"), (axes[1, 0], 2, "inclination error, °")):
         top = 1.0
         for one in judged[::-1]:
             values = np.degrees(one.error.errors[rows, part])  # type: ignore[union-attr]
             axis.plot(t, values, label=one.title, **LOOKS[one.name])
             top = max(top, 1.15 * float(np.nanpercentile(values, 99.5)))
+        if bounds is not None:
+            look = {"color": LOOKS[judged[0].name]["color"], "alpha": 0.15, "linewidth": 0}
+            axis.fill_between(t, 0, bounds[part - 1], label=f"95 % of {judged[0].title}, declared", **look)
         axis.set(ylabel=label, ylim=(0, top))
     axes[1, 0].set_xlabel("time, s")
     legend_below(figure, axes[1, 0])
@@ -141,6 +144,16 @@ def spread(solved: tuple[Solved, ...]) -> Figure | None:
     axes[1, 0].set(ylabel=f"inclination from\n{first.title}, °", xlabel="time, s")
     legend_below(figure, axes[1, 0])
     return figure
+
+
+def _bounds(one: Solved, rows: NDArray[np.int64]) -> tuple[Array, Array] | None:
+    """Heading and inclination (K,), degrees, that 95 % of errors stay below if the covariance is right."""
+    if one.history.cov is None:
+        return None
+    world_R_body = rotation_matrix(one.history.world_q_body[rows])
+    cov = world_R_body @ one.history.cov[rows] @ np.swapaxes(world_R_body, 1, 2)
+    level = 0.5 * (cov[:, 0, 0] + cov[:, 1, 1])
+    return np.degrees(1.96 * np.sqrt(cov[:, 2, 2])), np.degrees(2.448 * np.sqrt(level))
 
 
 def _unjumped(path: Array) -> Array:

@@ -184,7 +184,7 @@ def speed(every: list[Trial]) -> dict[str, Figure]:
         if name != SMOOTHER:
             works[name] = lambda one=one: one.estimate_many(recordings, threads=1)
     seconds = cpu_seconds(works, rounds=7)
-    figures = {}
+    figures = smoothing_speed(recordings, samples)
     for name, spent in seconds.items():
         micros, bars = 1e6 * spent / samples, (1.0, 0.3) if name == CAUSAL else (None, None)
         figures[f"speed_{name}"] = Figure(micros, "µs", "a sample, one thread")
@@ -192,6 +192,20 @@ def speed(every: list[Trial]) -> dict[str, Figure]:
             said = f"of VQF.updateBatch's {1e6 * seconds['vqf'] / samples:.3f} µs a sample"
             figures[f"speed_{name}_over_vqf"] = Figure(spent / seconds["vqf"], "x", said, *bars)
     return figures
+
+
+def smoothing_speed(recordings: list[ImuRecording], samples: int) -> dict[str, Figure]:
+    """The smoother over all trials beside offlineVQF."""
+    smoother = our_filters()[SMOOTHER]
+    works = {
+        "offline_vqf": lambda: [PEERS["offline_vqf"](one) for one in recordings],
+        SMOOTHER: lambda: smoother.estimate_many(recordings, threads=1),
+    }
+    seconds = cpu_seconds(works, rounds=3)
+    return {
+        f"speed_{name}": Figure(1e6 * spent / samples, "µs", "a sample, one thread")
+        for name, spent in seconds.items()
+    }
 
 
 def every_trial(scores: Table) -> dict[str, Figure]:

@@ -51,7 +51,7 @@ def test_the_names_are_those_of_the_library():
     assert set(available()) <= set(FILTERS)
 
 
-@pytest.mark.parametrize("name", ["mahony", "madgwick", "complementary", "kalman"])
+@pytest.mark.parametrize("name", available())
 def test_every_filter_finds_the_attitude(moved, name):
     log, truth, angles = moved
     done = run(log, *UNITS, "--filter", name, "--truth", truth, "--json")
@@ -61,7 +61,7 @@ def test_every_filter_finds_the_attitude(moved, name):
     found = whole["filters"][name]
     assert found["error_deg"]["total"] < 1.5
     assert found["final_deg"]["roll"] == pytest.approx(np.degrees(angles[-1, 0]), abs=2.0)
-    assert ("nees" in found) == (name == "kalman")
+    assert ("nees" in found) == (name in {"error-state", "smoother", "kalman"})
 
 
 def test_the_report_and_the_orientation_are_written(moved, tmp_path):
