@@ -28,6 +28,7 @@ from sequential.sensors import (
     turn_gains,
     verify,
 )
+from sequential.sensors.gravity_fit import Prior
 
 __all__ = ["Calibrated", "calibrate_accel", "calibrate_gyro", "calibrate_imu"]
 
@@ -92,10 +93,19 @@ def calibrate_imu(
     gyro = (between or GyroBetweenDwells()).calibrate(
         done.recording, done.dwells, accel.calibration, used=accel.used
     )
-    bundle = ImuCalibration(accel.calibration, gyro.calibration, None, gyro.rest.g_sensitivity)
-    return replace(
-        done, calibration=bundle, gyro=gyro, rest=gyro.rest, findings=(*accel.findings, *gyro.findings)
-    )
+    bundle = ImuCalibration(gyro.accel, gyro.calibration, None, gyro.rest.g_sensitivity)
+    findings = (*_still_open(accel.findings, gyro.accel), *gyro.findings)
+    return replace(done, calibration=bundle, gyro=gyro, rest=gyro.rest, findings=findings)
+
+
+def _still_open(findings: Sequence[Finding], refined: AffineCalibration) -> list[Finding]:
+    """Findings of the accelerometer's fit less what the moves have cleared up."""
+    assert refined.cov is not None  # noqa: S101 - a fit has a covariance
+    sigma = np.sqrt(np.diag(refined.cov))[[3, 6, 7]] / np.diag(refined.matrix)[[0, 0, 1]]
+    if (sigma > 0.5 * Prior().shear).any():
+        return list(findings)
+    what = "a misalignment of the accelerometer that its positions do not show comes from the gyro's moves"
+    return [Finding("note", what) if "cannot be seen" in one.what else one for one in findings]
 
 
 def calibrate_gyro(

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.calibration.job import Calibrated
-from sequential.sensors import AccelerometerFit, AffineCalibration
+from sequential.sensors import AffineCalibration
+from sequential.sensors.gravity_fit import Prior
 
 __all__ = ["Parameter", "parameters_of"]
 
@@ -39,8 +40,10 @@ class Parameter:
 def parameters_of(done: Calibrated) -> tuple[Parameter, ...]:
     """All constants of a job, in the order of a data sheet: gain, misalignment, offset; sensor by sensor."""
     found: list[Parameter] = []
-    if done.accel is not None:
-        found += _accel(done.accel)
+    if done.accel is not None and done.calibration.accel is not None:
+        crossed = bool(np.any(np.abs(done.accel.fit.parameters[3:6]) > 1e-9))
+        factor = _t95(done.accel.fit.freedom + 1.0)
+        found += _accel(done.calibration.accel, factor, crossed=crossed)
     if done.calibration.gyro is not None:
         freedom = max(len(done.dwells) - 1.0, 1.0) if done.gyro is None else done.gyro.fit.freedom
         kept = _kept(done)
@@ -48,24 +51,25 @@ def parameters_of(done: Calibrated) -> tuple[Parameter, ...]:
     return tuple(found)
 
 
-def _accel(accel: AccelerometerFit) -> list[Parameter]:
-    fit, unit = accel.fit, accel.calibration.unit_in
-    si, degree = unit == "m/s^2", np.degrees(1.0)
-    half = _t95(fit.freedom + 1.0) * np.sqrt(np.diag(fit.cov))
-    shears = bool(np.any(np.abs(fit.parameters[3:6]) > 1e-9))
-    kinds = (
-        ("gain", "xyz", 1.0, "" if si else f"m/s² per {unit.removesuffix('s')}", 1.0 if si else None),
-        ("misalignment", ("yx", "zx", "zy"), degree, "°", 0.0),
-        ("offset", "xyz", 1.0, "m/s²" if si else unit, 0.0 if si else None),
-    )
+def _accel(accel: AffineCalibration, factor: float, *, crossed: bool) -> list[Parameter]:
+    si, degree = accel.unit_in == "m/s^2", float(np.degrees(1.0))
+    half = factor * np.sqrt(np.diag(accel.cov)) if accel.cov is not None else np.zeros(12)
+    values, gains = np.concatenate([accel.matrix.ravel(), accel.offset]), np.diag(accel.matrix)
+    per = "" if si else f"m/s² per {accel.unit_in.removesuffix('s')}"
+    rows: list[tuple[str, int, float, str, float | None]] = []
+    rows += [(f"gain {axis}", 4 * k, 1.0, per, 1.0 if si else None) for k, axis in enumerate("xyz")]
+    for k in (3, 6, 7) if crossed else ():
+        rows.append(
+            (f"misalignment {'xyz'[k // 3]}{'xyz'[k % 3]}", k, degree / float(gains[k % 3]), "°", 0.0)
+        )
+    unit = "m/s²" if si else accel.unit_in
+    rows += [(f"offset {axis}", 9 + k, 1.0, unit, 0.0 if si else None) for k, axis in enumerate("xyz")]
     found = []
-    for block, (kind, places, scale, shown, nominal) in enumerate(kinds):
-        for k, place in enumerate(places, 3 * block):
-            if kind != "misalignment" or shears:
-                value, spread = float(fit.parameters[k] * scale), float(half[k] * scale)
-                limits = (value - spread, value + spread)
-                seen = bool(fit.kept[k] < VAGUE)
-                found.append(Parameter("accel", f"{kind} {place}", value, limits, shown, nominal, seen))
+    for name, k, scale, shown, nominal in rows:
+        value, spread = float(values[k] * scale), float(half[k] * abs(scale))
+        seen = not name.startswith("mis") or spread < factor * VAGUE * np.degrees(Prior().shear)
+        limits = (value - spread, value + spread) if spread > 0 else None
+        found.append(Parameter("accel", name, value, limits, shown, nominal, bool(seen)))
     return found
 
 

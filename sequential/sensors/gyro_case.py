@@ -21,13 +21,25 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GyroCase:
-    """Moves to be explained: gravity before and after (S, 3), readings between, noise of the arrival."""
+    """Moves to be explained, by the gyro's constants and by what is doubtful about the accelerometer's.
 
-    start: Array
-    end: Array
+    Parameters
+    ----------
+    before, after : (S, 3) mean raw accelerometer at the ends of the dwells next to each move
+    accel : its calibration; `doubt` (12, q) is a root of the covariance of that
+    intervals : readings of the gyro between
+    noise : (2 S,) variance of the arriving direction, rad²
+    gain : nominal, rad/s per unit of the gyro's reading
+    rest : what the gyro reads at rest
+    """
+
+    before: Array
+    after: Array
+    accel: AffineCalibration
+    doubt: Array
     intervals: GyroIntervals
-    noise: Array  # (2 S,) rad²
-    gain: float  # nominal, rad/s per unit of the reading
+    noise: Array
+    gain: float
     rest: GyroAtRest
 
     @classmethod
@@ -41,54 +53,107 @@ class GyroCase:
         edge: float,
     ) -> GyroCase:
         """Gravity `edge` seconds around both ends of every move, and the readings between."""
-        assert recording.accel is not None  # noqa: S101 - the caller has looked
+        raw = recording.accel
+        assert raw is not None  # noqa: S101 - the caller has looked
         assert recording.gyro is not None  # noqa: S101
-        force = accel.apply(recording.accel)
         if rest.g_sensitivity is not None:
-            recording = replace(recording, gyro=recording.gyro - force @ rest.g_sensitivity.T)
+            felt = accel.apply(raw) @ rest.g_sensitivity.T
+            recording = replace(recording, gyro=recording.gyro - felt)
         half = max(1, round(edge * recording.rate / 2))
         leave = np.maximum(dwells.stop[moves] - half, dwells.start[moves])
         arrive = np.minimum(dwells.start[moves + 1] + half, dwells.stop[moves + 1])
-        start, start_noise = _directions(force, leave, half)
-        end, end_noise = _directions(force, arrive, half)
+        before, before_noise = _edges(raw, leave, half, accel)
+        after, after_noise = _edges(raw, arrive, half, accel)
         intervals = intervals_between(recording, leave, arrive)
+        start, end = (_unit(accel.apply(raw)) for raw in (before, after))
         gain = 1.0 if recording.gyro_unit == "rad/s" else _nominal_gain(start, end, intervals, rest.bias)
         clipped = (intervals.clipped * gain * intervals.dt.max() * np.ptp(intervals.raw) / 10) ** 2
-        return cls(start, end, intervals, np.repeat(start_noise + end_noise + clipped, 2), gain, rest)
+        noise = np.repeat(before_noise + after_noise + clipped, 2)
+        return cls(before, after, accel, _root(accel.cov), intervals, noise, gain, rest)
 
     def only(self, used: Mask) -> GyroCase:
         """The same problem with some of the moves."""
         parts = self.intervals
         kept = GyroIntervals(parts.raw[used], parts.dt[used], parts.clipped[used])
         noise = self.noise[np.repeat(used, 2)]
-        return replace(self, start=self.start[used], end=self.end[used], intervals=kept, noise=noise)
+        return replace(self, before=self.before[used], after=self.after[used], intervals=kept, noise=noise)
+
+    def refined(self, x: Array, cov: Array) -> AffineCalibration:
+        """The accelerometer's calibration at the fitted parameters (12 + q,), with its covariance."""
+        change = self.doubt @ x[12:]
+        return replace(
+            self.accel,
+            matrix=self.accel.matrix + change[:9].reshape(3, 3),
+            offset=self.accel.offset + change[9:],
+            cov=None if self.accel.cov is None else self.doubt @ cov[12:, 12:] @ self.doubt.T,
+        )
 
     def residuals(self, x: Array) -> tuple[Array, Array]:
-        """Arriving direction less the one read, across it (2 S,), and its derivative (2 S, 12)."""
-        turn = turned(x[:9].reshape(3, 3) * self.gain, x[9:] / self.gain, self.intervals)
-        arriving = np.einsum("sji,sj->si", turn.rotation, self.start)
-        across = _across(self.end)
-        off = np.einsum("sai,si->sa", across, arriving - self.end)
-        change = np.einsum("sai,sij->saj", across, _skew(arriving))
-        J = np.concatenate([change @ turn.by_matrix * self.gain, change @ turn.by_offset / self.gain], axis=2)
-        return off.ravel(), J.reshape(-1, 12)
+        """Arriving direction less the one read, across it (2 S,), and its derivative (2 S, 12 + q)."""
+        turn = turned(x[:9].reshape(3, 3) * self.gain, x[9:12] / self.gain, self.intervals)
+        change = self.doubt @ x[12:]
+        matrix, offset = self.accel.matrix + change[:9].reshape(3, 3), self.accel.offset + change[9:]
+        start, by_start = _direction(self.before, matrix, offset)
+        end, by_end = _direction(self.after, matrix, offset)
+        back = turn.rotation.transpose(0, 2, 1)
+        arriving = np.einsum("sij,sj->si", back, start)
+        across = _across(self.accel.apply(self.after))  # one plane for all trials
+        off = np.einsum("sai,si->sa", across, arriving - end)
+        moved = across @ _skew(arriving)
+        by_gyro = [moved @ turn.by_matrix * self.gain, moved @ turn.by_offset / self.gain]
+        by_accel = across @ (back @ by_start - by_end) @ self.doubt
+        return off.ravel(), np.concatenate([*by_gyro, by_accel], axis=2).reshape(off.size, -1)
 
-    def angles(self, matrix: Array, offset: Array) -> Array:
+    def angles(self, matrix: Array, offset: Array, accel: AffineCalibration) -> Array:
         """Angle (S,) between arriving and measured direction, rad."""
-        arriving = np.einsum("sji,sj->si", rotations(matrix, offset, self.intervals)[:, -1], self.start)
-        cross = np.linalg.norm(np.cross(arriving, self.end), axis=1)
-        return np.asarray(np.arctan2(cross, np.sum(arriving * self.end, axis=1)))
+        start, end = (_unit(accel.apply(raw)) for raw in (self.before, self.after))
+        arriving = np.einsum("sji,sj->si", rotations(matrix, offset, self.intervals)[:, -1], start)
+        return _angle(arriving, end)
+
+    def moved(self) -> Array:
+        """Angle (S,) between gravity before and after each move, rad."""
+        return _angle(*(_unit(self.accel.apply(raw)) for raw in (self.before, self.after)))
 
 
-def _directions(force: Array, rows: NDArray[np.int64], half: int) -> tuple[Array, Array]:
-    """Unit mean (S, 3) of the samples around each row, and its variance per axis across (S,), rad²."""
-    found, noise = np.empty((len(rows), 3)), np.empty(len(rows))
+def _edges(raw: Array, rows: NDArray[np.int64], half: int, accel: AffineCalibration) -> tuple[Array, Array]:
+    """Mean (S, 3) of the samples around each row, and the variance (S,) of its direction, rad²."""
+    means, noise = np.empty((len(rows), 3)), np.empty(len(rows))
     for k, row in enumerate(rows.tolist()):
-        part = force[max(row - half, 0) : row + half + 1]
-        mean = part.mean(axis=0)
-        found[k] = mean / np.linalg.norm(mean)
-        noise[k] = part.var(axis=0).sum() / 3 / len(part) / float(mean @ mean)
-    return found, noise
+        part = raw[max(row - half, 0) : row + half + 1]
+        means[k] = part.mean(axis=0)
+        force = accel.apply(part)
+        noise[k] = force.var(axis=0).sum() / 3 / len(part) / float(np.sum(force.mean(axis=0) ** 2))
+    return means, noise
+
+
+def _direction(raw: Array, matrix: Array, offset: Array) -> tuple[Array, Array]:
+    """Unit calibrated reading (S, 3) and its derivative (S, 3, 12) by matrix and offset."""
+    centred = raw - offset
+    force = centred @ matrix.T
+    length = np.linalg.norm(force, axis=1)[:, None]
+    unit = force / length
+    flat = (np.eye(3) - unit[:, :, None] * unit[:, None, :]) / length[..., None]
+    by_matrix = np.einsum("sia,sb->siab", flat, centred).reshape(len(raw), 3, 9)
+    return unit, np.concatenate([by_matrix, -flat @ matrix], axis=2)
+
+
+def _root(cov: Array | None) -> Array:
+    """A root (12, q) of a covariance of rank q; nothing is doubtful without one."""
+    if cov is None:
+        return np.zeros((12, 0))
+    sigma = np.sqrt(np.clip(np.diag(cov), 0.0, None))
+    scale = np.where(sigma > 0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(cov / np.outer(scale, scale))
+    kept = values > 1e-9
+    return np.asarray(sigma[:, None] * vectors[:, kept] * np.sqrt(values[kept]))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
+
+
+def _angle(a: Array, b: Array) -> Array:
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1)))
 
 
 def _nominal_gain(start: Array, end: Array, intervals: GyroIntervals, bias: Array) -> float:
@@ -115,6 +180,7 @@ def _skew(v: Array) -> Array:
 
 def _across(direction: Array) -> Array:
     """Two unit vectors across each direction, (S, 2, 3)."""
+    direction = _unit(direction)
     away = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
     first = np.cross(direction, away)
     first /= np.linalg.norm(first, axis=1)[:, None]

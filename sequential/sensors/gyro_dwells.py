@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import UnderConstrainedError
+from sequential.errors import DataError, UnderConstrainedError
 from sequential.sensors.calibration import AffineCalibration
 from sequential.sensors.dwells import Dwells
 from sequential.sensors.finding import Finding
@@ -35,11 +35,13 @@ class GyroFit:
 
     `before`, `after` and `left_out` (S,) are the angle, rad, between gravity as the gyro carries it over the
     move and as the accelerometer reads it: with nominal constants, with the fitted ones, and with constants
-    fitted to the other moves.  `used` (S,) is False for a move that no constants explain, `whole` (S,) False
-    where the gyro reached the end of its range.
+    fitted to the other moves.  `accel` is the accelerometer's calibration with what the moves add to it:
+    much where its positions left a misalignment open.  `used` (S,) is False for a move that no
+    constants explain, `whole` (S,) False where the gyro reached the end of its range.
     """
 
     calibration: AffineCalibration
+    accel: AffineCalibration
     fit: Fitted
     rest: GyroAtRest
     seconds: Array  # (S, 2) beginning and end of the move
@@ -99,16 +101,22 @@ class GyroBetweenDwells:
                 "turn the sensor to ten positions or more, about every axis"
             )
         case = GyroCase.of(recording, dwells, accel, rest, moves, self.edge)
+        _require_agreement(recording.name, case)
         fit, chosen = self._without_impossible(case)
         _require_turned(recording.name, fit)
         return _result(recording, dwells, case, fit, chosen, moves)
 
     def fit(self, case: GyroCase, used: Mask) -> Fitted:
-        """Parameters (12,): the matrix over its nominal gain, row by row, and the offset times that gain."""
-        centre = np.concatenate([np.eye(3).ravel(), case.rest.bias * case.gain])
+        """Parameters (12 + q,).
+
+        The matrix over its nominal gain, row by row, the offset times that gain, and what is doubtful about
+        the accelerometer's constants in their own standard deviations.
+        """
+        doubts = case.doubt.shape[1]
+        centre = np.concatenate([np.eye(3).ravel(), case.rest.bias * case.gain, np.zeros(doubts)])
         bias_sigma = np.sqrt(np.diag(case.rest.cov)) * case.gain + 1e-7
-        diagonal = np.eye(3, dtype=bool).ravel()
-        unknowns = Unknowns(centre, np.concatenate([np.where(diagonal, self.gain, self.cross), bias_sigma]))
+        matrix_sigma = np.where(np.eye(3, dtype=bool).ravel(), self.gain, self.cross)
+        unknowns = Unknowns(centre, np.concatenate([matrix_sigma, bias_sigma, np.ones(doubts)]))
         chosen = case.only(used)
         return fit_with_scatter(chosen.residuals, lambda _: chosen.noise, unknowns, self.scatter)
 
@@ -116,7 +124,7 @@ class GyroBetweenDwells:
         """Leave out moves that the others make impossible, worst first, a quarter of them at most."""
         from scipy.special import stdtrit
 
-        used = np.ones(len(case.start), dtype=bool)
+        used = np.ones(len(case.before), dtype=bool)
         while True:
             fit = self.fit(case, used)
             score = _left_out(fit)[1]
@@ -138,6 +146,17 @@ def _left_out(fit: Fitted) -> tuple[Array, Array]:
     return np.linalg.norm(missed[..., 0], axis=1), np.sqrt(square)
 
 
+def _require_agreement(name: str, case: GyroCase) -> None:
+    """Nominal constants must carry gravity roughly to where it is; no gain error of a chip explains 40 %."""
+    nominal = case.angles(np.eye(3) * case.gain, case.rest.bias, case.accel)
+    if np.median(nominal) > max(0.4 * float(np.median(case.moved())), np.radians(10.0)):
+        raise DataError(
+            f"gyro and accelerometer of {name!r} disagree about the moves: gravity arrives off by "
+            f"{np.degrees(np.median(nominal)):.0f}° in the median; are axes swapped, a sign inverted, or "
+            "degrees taken for radians?"
+        )
+
+
 def _require_turned(name: str, fit: Fitted) -> None:
     unseen = [axis for axis, k in zip("xyz", (0, 4, 8), strict=True) if fit.kept[k] > FREE]
     if unseen:
@@ -157,11 +176,12 @@ def _result(
 ) -> GyroFit:
     gain = case.gain
     scale = np.concatenate([np.full(9, gain), np.full(3, 1 / gain)])
-    matrix, offset = fit.parameters[:9].reshape(3, 3) * gain, fit.parameters[9:] / gain
+    matrix, offset = fit.parameters[:9].reshape(3, 3) * gain, fit.parameters[9:12] / gain
+    accel = case.refined(fit.parameters, fit.cov)
     calibration = AffineCalibration(
         matrix,
         offset,
-        fit.cov * np.outer(scale, scale),
+        fit.cov[:12, :12] * np.outer(scale, scale),
         "gyro",
         recording.gyro_unit,
         "rad/s",
@@ -173,13 +193,14 @@ def _result(
     seconds = np.stack([dwells.seconds[moves, 1], dwells.seconds[moves + 1, 0]], axis=1)
     return GyroFit(
         calibration,
+        accel,
         fit,
         case.rest,
         seconds,
         used,
         case.intervals.clipped == 0,
-        case.angles(np.eye(3) * gain, case.rest.bias),
-        case.angles(matrix, offset),
+        case.angles(np.eye(3) * gain, case.rest.bias, case.accel),
+        case.angles(matrix, offset, accel),
         left_out,
         _findings(seconds, case, fit, used),
     )

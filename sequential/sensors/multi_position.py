@@ -89,6 +89,7 @@ class MultiPosition:
         self._require_enough(dwells)
         means, covs = dwells.accel, dwells.accel_cov
         start = nominal(means, self.gravity, si=dwells.accel_unit == "m/s^2")
+        self._require_unit(dwells)
         self._require_observed(dwells, foreseen(means, self.gravity, start, self.prior, shears=self.shears))
         used = robust_inliers(means, covs, self.gravity, start, self.prior, shears=self.shears)
         used, left_out, sigmas = self._cross_validated(dwells, used)
@@ -142,6 +143,16 @@ class MultiPosition:
             else:
                 break
         return used, left_out, sigmas
+
+    def _require_unit(self, dwells: Dwells) -> None:
+        """In SI units the length at rest is near g, whatever the constants of a chip."""
+        assert dwells.accel is not None  # noqa: S101 - calibrate() has looked
+        length = float(np.median(np.linalg.norm(dwells.accel, axis=1)))
+        if dwells.accel_unit == "m/s^2" and not 0.7 < length / self.gravity < 1.4:
+            raise DataError(
+                f"the accelerometer of {dwells.name!r} reads {length:.3g} m/s² at rest, expected "
+                f"{self.gravity:.2f}: the unit is another one (g? counts?); give it when reading"
+            )
 
     @property
     def _fewest(self) -> int:

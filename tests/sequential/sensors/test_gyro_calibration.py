@@ -14,6 +14,7 @@ from dwell_worlds import (
 from sequential.errors import DataError, UnderConstrainedError
 from sequential.manifold.quaternion import quaternion_exp, quaternion_log, quaternion_multiply
 from sequential.sensors import (
+    SIX_POSITIONS,
     AffineCalibration,
     GyroBetweenDwells,
     ImuCalibration,
@@ -25,6 +26,7 @@ from sequential.sensors import (
     turn_gains,
     verify,
 )
+from sequential.sensors.gyro_case import GyroCase
 from sequential.sensors.gyro_integral import GyroIntervals, saturated, turned
 
 TRUE_ACCEL = AffineCalibration(ACCEL_MATRIX, ACCEL_OFFSET)
@@ -59,6 +61,38 @@ def test_a_turn_is_a_product_of_its_steps(rng):
         q = quaternion_multiply(q, quaternion_exp(raw[0, k] * dt[0, k]))
     whole = turned(np.eye(3), np.zeros(3), GyroIntervals(raw, dt, np.zeros(1, int)))
     np.testing.assert_allclose(whole.quaternion[0], q, atol=1e-13)
+
+
+def test_residuals_of_the_moves_meet_differences(rng):
+    imu, _ = recorded(attitudes(4, rng), rng)
+    dwells = find_dwells(imu)
+    root = 1e-2 * rng.standard_normal((12, 12))
+    accel = AffineCalibration(ACCEL_MATRIX, ACCEL_OFFSET, root @ root.T)
+    case = GyroCase.of(imu, dwells, accel, bias_at_rest(dwells), np.arange(len(dwells) - 1), 0.3)
+    x = np.concatenate([GYRO_MATRIX.ravel(), GYRO_BIAS, 0.5 * rng.standard_normal(12)])
+    _, J = case.residuals(x)
+    step = 1e-5
+    ends = [(case.residuals(x + step * e)[0], case.residuals(x - step * e)[0]) for e in np.eye(24)]
+    differenced = np.stack([(a - b) / (2 * step) for a, b in ends], axis=1)
+    np.testing.assert_allclose(J, differenced, atol=2e-7)
+    refined = case.refined(x, np.eye(24))
+    np.testing.assert_allclose(refined.cov, accel.cov, atol=1e-12)
+
+
+def test_moves_show_what_positions_hide(rng):
+    """Axes up and down alone leave the accelerometer's shears open; the gyro sees them."""
+    axes = np.concatenate(
+        [SIX_POSITIONS, SIX_POSITIONS[[0, 2, 4, 1, 3, 5]], SIX_POSITIONS[[4, 0, 3, 5, 1, 2]]]
+    )
+    imu, _ = recorded(axes, rng)
+    dwells = find_dwells(imu)
+    accel = MultiPosition().calibrate(dwells)
+    assert accel.fit.kept[3:6].max() > 0.9
+    done = GyroBetweenDwells().calibrate(imu, dwells, accel.calibration, used=accel.used)
+    shears = np.array([3, 6, 7])
+    before, after = (np.sqrt(np.diag(one.cov))[shears] for one in (accel.calibration, done.accel))
+    assert (after < 0.7 * before).all()
+    assert (np.abs((done.accel.matrix - ACCEL_MATRIX).ravel()[shears]) < 3 * after).all()
 
 
 def test_truth_is_found_between_dwells(rng):
@@ -162,6 +196,12 @@ def test_bad_input_is_named(rng):
     imu, _ = recorded(attitudes(4, rng), rng)
     with pytest.raises(UnderConstrainedError, match="3 moves"):
         GyroBetweenDwells().calibrate(imu, find_dwells(imu), TRUE_ACCEL)
+    many, _ = recorded(attitudes(12, rng), rng)
+    dwells = find_dwells(many)
+    for turned_round in (many.gyro[:, [1, 0, 2]], many.gyro * [1, -1, 1], np.degrees(many.gyro)):
+        wrong = ImuRecording(many.t, many.accel, turned_round)
+        with pytest.raises(DataError, match="disagree about the moves"):
+            GyroBetweenDwells().calibrate(wrong, dwells, TRUE_ACCEL)
     level = np.concatenate([spun(0, [40.0] * 8)])
     imu, _ = recorded(level, rng)
     with pytest.raises(UnderConstrainedError, match=r"hardly turn about y|about y and z"):
@@ -175,6 +215,7 @@ def test_mpu6050_turn_and_xsens(data_dir):
     accel = MultiPosition().calibrate(dwells)
     gyro = GyroBetweenDwells().calibrate(imu, dwells, accel.calibration, used=accel.used)
     assert (~gyro.whole).sum() == 3
+    assert gyro.accel.cov[3, 3] < 0.05 * accel.calibration.cov[3, 3]
     trial = verify(ImuCalibration(accel.calibration, gyro.calibration), mpu6050(data_dir, "imu_90_x_rot"))
     (move,) = trial.moves
     assert np.degrees(move.off) < 0.5

@@ -124,6 +124,9 @@ def test_shears_that_no_position_shows_are_said(rng):
 def test_too_few_dwells(rng):
     with pytest.raises(UnderConstrainedError, match="5 dwells"):
         MultiPosition().calibrate(drawn(sphere(5, rng), rng))
+    in_g = drawn(sphere(12, rng), rng)
+    with pytest.raises(DataError, match="the unit is another one"):
+        MultiPosition().calibrate(replace(in_g, accel=in_g.accel / GRAVITY))
     with pytest.raises(DataError, match="no accelerometer"):
         MultiPosition().calibrate(replace(drawn(sphere(9, rng), rng), accel=None))
 
