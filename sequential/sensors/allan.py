@@ -23,7 +23,7 @@ LOWEST_COLOUR = {2: -2, 3: -4}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AllanDeviation:
-    """Deviations with 95 % intervals; arrays are (T,) for one axis, (T, k) for k axes.
+    """Deviations with 95 % intervals; arrays are (T,) for one axis, (T, k) for k axes, read-only.
 
     Parameters
     ----------
@@ -46,6 +46,10 @@ class AllanDeviation:
     dof: Array
     alpha: NDArray[np.int64]
     n: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        for name in ("tau", "deviation", "low", "high", "dof", "alpha", "n"):
+            getattr(self, name).flags.writeable = False
 
     def axis(self, index: int) -> AllanDeviation:
         """One axis of several, arrays of shape (T,)."""

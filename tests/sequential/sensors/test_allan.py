@@ -156,6 +156,20 @@ def test_hadamard_is_blind_to_a_drift(rng):
     assert np.allclose(drift.deviation, 0.01 * RATE * drift.tau / np.sqrt(2), rtol=1e-9)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_turning_the_sensor_keeps_the_sum_over_its_axes(kind, rng):
+    x = np.stack([all_sorts(rng, 2000), white(rng, 2000), random_walk(rng, 2000)], axis=1)
+    turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    sums = [np.sum(allan_deviation(y, RATE, kind).deviation ** 2, axis=1) for y in (x, x @ turn)]
+    assert np.allclose(*sums, rtol=1e-9)
+
+
+def test_results_are_read_only(rng):
+    found = allan_deviation(white(rng, 100), RATE)
+    with pytest.raises(ValueError, match="read-only"):
+        found.deviation[0] = 0.0
+
+
 def test_a_stuck_axis_deviates_by_nothing():
     found = allan_deviation(np.full(100, 0.1), RATE)
     assert np.allclose(found.deviation, 0.0, atol=1e-15)

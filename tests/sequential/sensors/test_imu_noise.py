@@ -5,8 +5,16 @@ import pytest
 from noise_worlds import still_sensor
 
 from sequential.errors import DataError, MissingStreamError
+from sequential.noise import ImuNoise
 from sequential.readers import read_kalibr_imu, write_kalibr_imu
-from sequential.sensors import ImuRecording, allan_deviation, imu_noise
+from sequential.sensors import (
+    ImuErrors,
+    ImuRecording,
+    allan_deviation,
+    imu_noise,
+    simulate_imu,
+    stationary,
+)
 
 RATE = 100.0
 SENSORS = {"accel": {"N": 3e-3, "K": 2e-3}, "gyro": {"N": 1e-4}}
@@ -33,6 +41,17 @@ def test_densities_are_those_of_the_sensor(rng):
     assert not report.notes
     assert report.fits["gyro"][2].unit == "rad/s"
     assert report.deviations["accel"].deviation.shape == (len(report.deviations["accel"].tau), 3)
+
+
+def test_what_is_simulated_is_read_back(rng):
+    given = ImuNoise(gyro_density=2e-3, accel_density=1e-2, gyro_bias_walk=2e-3, accel_bias_walk=1e-2)
+    recording, _ = simulate_imu(stationary(200.0), rng, errors=ImuErrors(noise=given))
+    report = imu_noise(recording)
+    assert not report.bounds
+    for name, tolerance in (
+        ("gyro_density", 0.03), ("accel_density", 0.03), ("gyro_bias_walk", 0.25), ("accel_bias_walk", 0.25)
+    ):  # fmt: skip
+        assert getattr(report.noise, name) == pytest.approx(getattr(given, name), rel=tolerance)
 
 
 def test_one_sensor_alone_gives_its_fits(rng):
