@@ -1,6 +1,7 @@
 """Likelihood of the four noise terms, its greatest value, and how far each term may go.
 
-Restricted likelihood (the mean and a linear drift are projected out), Fisher scoring with terms that X
+Restricted likelihood (the mean and a linear drift are projected out), Fisher scoring with terms that cannot
+be negative, and profile-likelihood intervals (Wilks 1938; Self and Liang 1987 at the edge of the parameters).
 """
 
 from __future__ import annotations
