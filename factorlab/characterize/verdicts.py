@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from factorlab.characterize.engine import Study
+from factorlab.characterize.level_verdicts import estimated, of_drift, of_heat, of_level, worst
 from factorlab.characterize.words import group_name, largest_of, say
 from factorlab.report.document import Status, Verdict
 from factorlab.report.words import Language, number
-from sequential.sensors import Characteristics, Estimate
+from sequential.sensors import Characteristics
 
 __all__ = ["at_rest"]
 
 Axes = list[Characteristics]
-STANDARD_GRAVITY = 9.80665
-TURN = np.radians(0.05)  # rad/s of gyro bias below which nobody minds
-OFF_GRAVITY = 0.01
-LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
-LARGE = 0.5  # σ of a reading by which the bias moves during a recording, before it is a warning
 LOUD = 0.02  # share of the noise power in a line that is worth a warning
 RARE, FAR_OUT = 1e-4, 15.0  # share of outliers, and σ of a typical one, below which nobody minds
 FEWEST_BITS = 4.0
@@ -36,16 +32,12 @@ def at_rest(study: Study, lang: Language) -> Iterator[Verdict]:
         if axes:
             yield from _moving(axes, lang)
             yield _sigma(axes, group, lang)
-            yield from _level(axes, group, lang)
-            for about in (_drift, _heat, _resolution, _normal):
+            yield from of_level(axes, group, lang)
+            for about in (of_drift, of_heat, _resolution, _normal):
                 yield from about(axes, lang)
             for of_group in (_outliers, _timing):
                 yield of_group(axes, group, lang)
             yield from _line(axes, lang)
-
-
-def _worst(axes: Axes, by: Callable[[Characteristics], float]) -> Characteristics:
-    return max(axes, key=by)
 
 
 def _stuck(one: Characteristics, lang: Language) -> Verdict:
@@ -55,7 +47,7 @@ def _stuck(one: Characteristics, lang: Language) -> Verdict:
 
 def _moving(axes: Axes, lang: Language) -> Iterator[Verdict]:
     """Readings that go much farther than they differ from one to the next are no noise."""
-    one = _worst(axes, lambda axis: axis.noise.sigma.value / max(axis.noise.step_sigma, 1e-300))
+    one = worst(axes, lambda axis: axis.noise.sigma.value / max(axis.noise.step_sigma, 1e-300))
     if one.noise.moving:
         times = one.noise.sigma.value / one.noise.step_sigma
         words = say(lang, "moving_means", x=times), say(lang, "moving_do")
@@ -63,7 +55,7 @@ def _moving(axes: Axes, lang: Language) -> Iterator[Verdict]:
 
 
 def _sigma(axes: Axes, group: str, lang: Language) -> Verdict:
-    one = _worst(axes, lambda axis: axis.noise.sigma.value)
+    one = worst(axes, lambda axis: axis.noise.sigma.value)
     noise = one.noise
     key = "sigma_white" if noise.white else "sigma_coloured"
     meaning = say(
@@ -78,93 +70,7 @@ def _sigma(axes: Axes, group: str, lang: Language) -> Verdict:
     )
     status: Status = "PASS" if noise.white else "WARN"
     action = "" if noise.white else say(lang, "sigma_coloured_do")
-    return _line_of(say(lang, "sigma", axis=one.name), noise.sigma, status, meaning, action, one.unit)
-
-
-def _line_of(metric: str, of: Estimate, status: Status, meaning: str, action: str, unit: str) -> Verdict:
-    return Verdict(metric, of.value, (of.low, of.high), status, meaning, action, unit)
-
-
-def _level(axes: Axes, group: str, lang: Language) -> Iterator[Verdict]:
-    """Bias of a gyro, size of gravity, or just the mean."""
-    if group == "gyro" and axes[0].unit == "rad/s":
-        one = _worst(axes, lambda axis: abs(axis.bias.value))
-        degrees = float(np.degrees(abs(one.bias.value)))
-        meaning = say(lang, "bias_gyro", deg=degrees, minute=60.0 * degrees)
-        large = abs(one.bias.value) > TURN
-        action = say(lang, "bias_gyro_do") if large else ""
-        yield _line_of(
-            say(lang, "bias", axis=one.name), one.bias, "WARN" if large else "PASS", meaning, action, one.unit
-        )
-    elif group == "accel" and axes[0].unit == "m/s²" and len(axes) == 3:
-        yield _gravity(axes, lang)
-    else:
-        for one in axes[:1] if group not in {"accel", "gyro", "mag"} else ():
-            meaning = say(lang, "mean_means", half=0.5 * (one.bias.high - one.bias.low))
-            yield _line_of(say(lang, "mean", axis=one.name), one.bias, "INFO", meaning, "", one.unit)
-
-
-def _gravity(axes: Axes, lang: Language) -> Verdict:
-    mean = np.array([one.bias.value for one in axes])
-    half = np.array([0.5 * (one.bias.high - one.bias.low) for one in axes])
-    norm = float(np.linalg.norm(mean))
-    wide = float(np.sqrt(np.sum((mean * half) ** 2))) / norm if norm else 0.0
-    off = abs(norm / STANDARD_GRAVITY - 1.0)
-    fits = off < OFF_GRAVITY
-    meaning = say(lang, "accel_fits" if fits else "accel_off", percent=100.0 * off)
-    return Verdict(
-        say(lang, "norm_accel"),
-        norm,
-        (norm - wide, norm + wide),
-        "PASS" if fits else "WARN",
-        meaning,
-        "" if fits else say(lang, "accel_do"),
-        "m/s²",
-    )
-
-
-def _drift(axes: Axes, lang: Language) -> Iterator[Verdict]:
-    """The axis whose trend stands out most."""
-    one = _worst(axes, lambda axis: abs(axis.drift.value) / (axis.drift.high - axis.drift.low or 1.0))
-    hourly, duration = one.drift.scaled(3600.0), one.timing.duration
-    if one.drifts:
-        change = abs(one.drift.value) * duration
-        sigmas = change / max(one.noise.sigma.value, 1e-300)
-        large = sigmas > LARGE
-        key = "drift_seen" if large else "drift_small"
-        meaning, action = (
-            say(lang, key, change=change, unit=one.unit, sigmas=sigmas),
-            say(lang, "drift_seen_do"),
-        )
-    else:
-        bound, large, action = 0.5 * (hourly.high - hourly.low), False, ""
-        meaning = say(lang, "drift_unseen", duration=duration, bound=bound, unit=one.unit)
-    status: Status = "WARN" if large else "INFO" if one.drifts else "PASS"
-    yield _line_of(say(lang, "drift", axis=one.name), hourly, status, meaning, action, unit=f"{one.unit}/h")
-
-
-def _heat(axes: Axes, lang: Language) -> Iterator[Verdict]:
-    """The axis that depends on temperature most clearly."""
-    if np.isnan(axes[0].warmed):
-        return
-    known = [one for one in axes if one.per_degree is not None]
-    if not known:
-        meaning = say(lang, "heat_none", warmed=axes[0].warmed)
-        yield Verdict(say(lang, "heat", axis=axes[0].name), None, None, "INFO", meaning)
-        return
-    one = _worst(known, lambda axis: _clear(axis.per_degree))
-    slope = one.per_degree
-    assert slope is not None  # noqa: S101 - chosen among those that have one
-    seen = _clear(slope) > 0.5
-    meaning = say(lang, "heat_seen" if seen else "heat_unseen", warmed=one.warmed)
-    action = say(lang, "heat_do") if seen else ""
-    status: Status = "WARN" if seen else "PASS"
-    yield _line_of(say(lang, "heat", axis=one.name), slope, status, meaning, action, f"{one.unit}/°C")
-
-
-def _clear(slope: Estimate | None) -> float:
-    """Size of a slope over the width of its interval; above a half, the interval leaves zero out."""
-    return 0.0 if slope is None else abs(slope.value) / max(slope.high - slope.low, 1e-300)
+    return estimated(say(lang, "sigma", axis=one.name), noise.sigma, status, meaning, action, one.unit)
 
 
 def _resolution(axes: Axes, lang: Language) -> Iterator[Verdict]:
@@ -197,7 +103,7 @@ def _resolution(axes: Axes, lang: Language) -> Iterator[Verdict]:
 
 def _normal(axes: Axes, lang: Language) -> Iterator[Verdict]:
     """The axis farthest from a normal distribution."""
-    one = _worst(axes, lambda axis: axis.distribution.distance)
+    one = worst(axes, lambda axis: axis.distribution.distance)
     seen, n = one.distribution, one.noise.n
     near = seen.nearly_normal
     doubtful = seen.p < 0.05
@@ -219,7 +125,7 @@ def _normal(axes: Axes, lang: Language) -> Iterator[Verdict]:
 
 
 def _outliers(axes: Axes, group: str, lang: Language) -> Verdict:
-    one = _worst(axes, lambda axis: axis.outliers.count)
+    one = worst(axes, lambda axis: axis.outliers.count)
     seen, metric = one.outliers, say(lang, "outliers", group=group_name(group, lang))
     share = seen.share.low, seen.share.high
     if not seen.count:

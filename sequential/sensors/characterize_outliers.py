@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.sensors.estimate import Estimate
-from sequential.signal import Hampel
+from sequential.signal import SIGMA_PER_MAD, SlidingMedian
 
 __all__ = ["Outliers", "outliers_of"]
 
 Array = NDArray[np.float64]
 WINDOW = 51
 THRESHOLD = 6.0  # σ; less than one normal reading in a million is flagged
+SAMPLED, CHUNK = 2000, 20_000
 QUIETEST = 0.9  # of the usual σ that a window's is taken to have at least
 
 
@@ -55,15 +56,20 @@ def outliers_of(t: Array, x: Array, lsb: float = 0.0) -> Outliers:
     -----
     Median and MAD of a window bear half of it being outliers, and a step of the signal is none.
     """
-    window = min(WINDOW, max(3, (len(x) // 2) | 1))
-    seen = Hampel(window, threshold=THRESHOLD, floor=lsb).spread(x)
-    known = np.isfinite(x)
+    known = np.flatnonzero(np.isfinite(x))
+    y = x[known]
+    window = min(WINDOW, max(3, (len(y) // 2) | 1))
+    distance = np.abs(y - SlidingMedian(window)(y))
     # 51 readings know their σ to a sixth only: where it came out small by chance, the usual one counts
-    usual = QUIETEST * float(np.median(seen.sigma[known])) if known.any() else 0.0
-    sigma = np.maximum(seen.sigma, usual)
-    where = np.asarray(known & (np.abs(x - seen.median) > THRESHOLD * sigma))
-    n, k = int(known.sum()), int(where.sum())
-    far = np.abs(x - seen.median)[where]
+    some = np.unique(np.linspace(0, len(y) - 1, min(len(y), SAMPLED)).astype(np.int64))
+    least = max(QUIETEST * float(np.median(_local_sigma(y, some, window))), lsb)
+    rows = np.flatnonzero(distance > THRESHOLD * least)
+    sigma = np.maximum(_local_sigma(y, rows, window), least)
+    out = distance[rows] > THRESHOLD * sigma
+    rows, sigma = rows[out], sigma[out]
+    where = np.zeros(len(x), dtype=bool)
+    where[known[rows]] = True
+    n, k, far = len(y), len(rows), distance[rows]
     hours = float(t[-1] - t[0]) / 3600.0 if len(t) > 1 else 0.0
     return Outliers(
         where,
@@ -71,8 +77,20 @@ def outliers_of(t: Array, x: Array, lsb: float = 0.0) -> Outliers:
         k / hours if hours > 0.0 else 0.0,
         float(np.median(far)) if k else float("nan"),
         float(far.max()) if k else float("nan"),
-        float(np.median(far / np.maximum(sigma[where], 1e-300))) if k else float("nan"),
+        float(np.median(far / np.maximum(sigma, 1e-300))) if k else float("nan"),
     )
+
+
+def _local_sigma(y: Array, rows: NDArray[np.int64], window: int) -> Array:
+    """1.4826 MAD of the window about each of some rows (R,); at the ends, of the nearest whole one."""
+    found = np.empty(len(rows))
+    first = np.clip(rows - window // 2, 0, max(len(y) - window, 0))
+    for start in range(0, len(rows), CHUNK):
+        part = slice(start, start + CHUNK)
+        near = y[first[part, None] + np.arange(min(window, len(y)))]
+        middle = np.median(near, axis=1, keepdims=True)
+        found[part] = SIGMA_PER_MAD * np.median(np.abs(near - middle), axis=1)
+    return found
 
 
 def _clopper_pearson(k: int, n: int) -> tuple[float, float]:

@@ -46,11 +46,6 @@ class Timing:
         """Whether the stamps look computed from a rate: then nothing is known about jitter."""
         return self.worst < SAME / self.rate and not len(self.gaps)
 
-    @property
-    def uneven(self) -> bool:
-        """Whether jitter or gaps are large enough to matter to spectra and Allan deviations."""
-        return self.jitter * self.rate > 0.2 or self.missing > 0.01 * self.rate * self.duration
-
 
 def timing_of(t: NDArray[np.int64]) -> Timing:
     """Rate, jitter and gaps of stamps (N,), int64 ns.
