@@ -94,10 +94,11 @@ def _constants(parameters: tuple[Parameter, ...]) -> Table:
 def _dwells(done: Calibrated) -> Table:
     fit = done.accel
     assert fit is not None  # noqa: S101 - the caller has looked
-    columns = np.stack([*done.dwells.seconds.T, fit.before, fit.after, fit.left_out], axis=1).tolist()
+    small = (1e3 * fit.after, 1e3 * fit.left_out)
+    columns = np.stack([*done.dwells.seconds.T, fit.before, *small], axis=1).round(4).tolist()
     used = ["yes" if one else "no" for one in fit.used]
     rows = tuple((k + 1, *row, used[k]) for k, row in enumerate(columns))
-    units = (("from", "s"), ("to", "s"), ("before", "m/s²"), ("after", "m/s²"), ("left out", "m/s²"))
+    units = (("from", "s"), ("to", "s"), ("before", "m/s²"), ("after", "mm/s²"), ("left out", "mm/s²"))
     return Table(("dwell", *units, "used"), rows, digits=4)
 
 
@@ -105,7 +106,7 @@ def _moves(done: Calibrated) -> Table:
     fit = done.gyro
     assert fit is not None  # noqa: S101 - the caller has looked
     angles = np.degrees([fit.before, fit.after, fit.left_out])
-    columns = np.stack([*fit.seconds.T, *angles], axis=1).tolist()
+    columns = np.stack([*fit.seconds.T, *angles], axis=1).round(4).tolist()
     words = np.where(fit.whole, np.where(fit.used, "yes", "no"), "range reached").tolist()
     rows = tuple((k + 1, *row, words[k]) for k, row in enumerate(columns))
     units = (("from", "s"), ("to", "s"), ("before", "°"), ("after", "°"), ("left out", "°"))

@@ -80,7 +80,7 @@ def test_residuals_of_the_moves_meet_differences(rng):
 
 
 def test_moves_show_what_positions_hide(rng):
-    """Axes up and down alone leave the accelerometer's shears open; the gyro sees them."""
+    """Axes up and down alone leave the accelerometer's shears open; the gyro sees more."""
     axes = np.concatenate(
         [SIX_POSITIONS, SIX_POSITIONS[[0, 2, 4, 1, 3, 5]], SIX_POSITIONS[[4, 0, 3, 5, 1, 2]]]
     )
