@@ -40,7 +40,7 @@ def _dwells(fit: AccelerometerFit) -> Verdict:
         f"a position that the fit has not seen reads g to {100 * rms / fit.gravity:.2g} %; "
         f"{before:.3g} m/s² before"
     )
-    if fit.fit.freedom < 1:
+    if fit.fit.freedom < 1 or np.isnan(rms):
         meaning = "as many positions as constants: nothing is left to check them with"
         return Verdict(
             "|mean| − g, RMS", _rms(fit.after), None, "INFO", meaning, "try them with --verify", "m/s²"

@@ -29,6 +29,7 @@ __all__ = ["AccelerometerFit", "MultiPosition"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+ALONE = 0.005  # of g, expected from the others: they know nothing of that dwell
 FREE, DOUBTFUL = 0.5, 0.7  # posterior over prior standard deviation: not observed
 DOUBT = 1e-3  # probability that a good recording loses a dwell
 
@@ -55,8 +56,14 @@ class AccelerometerFit:
 
     @property
     def leave_one_out_rms(self) -> float:
-        """Root mean square of `left_out` over the dwells that were used, m/s²."""
-        return float(np.sqrt(np.mean(self.left_out[self.used] ** 2)))
+        """Root mean square of `left_out` over the dwells that were used and are checked, m/s²; NaN for none."""
+        chosen = self.left_out[self.used & self.checked]
+        return float(np.sqrt(np.mean(chosen**2))) if len(chosen) else float("nan")
+
+    @property
+    def checked(self) -> Mask:
+        """Dwells (K,) that the others say something about: not the only one with an axis up, say."""
+        return np.asarray(self.sigmas < ALONE * self.gravity)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +113,7 @@ class MultiPosition:
             norms(fit.parameters, means) - self.gravity,
             left_out,
             sigmas,
-            self._findings(dwells, fit, used, left_out),
+            self._findings(dwells, fit, used, left_out, sigmas),
         )
 
     def _fit(self, dwells: Dwells, used: Mask) -> Fitted:
@@ -201,7 +208,9 @@ class MultiPosition:
             source or f"{dwells.name}: {int(used.sum())} dwells, g = {self.gravity:.5f} m/s^2",
         )
 
-    def _findings(self, dwells: Dwells, fit: Fitted, used: Mask, left_out: Array) -> tuple[Finding, ...]:
+    def _findings(
+        self, dwells: Dwells, fit: Fitted, used: Mask, left_out: Array, sigmas: Array
+    ) -> tuple[Finding, ...]:
         found = []
         for k in np.flatnonzero(~used):
             start, stop = dwells.seconds[k]
@@ -213,7 +222,12 @@ class MultiPosition:
                 planes = " and ".join(f"{name[-1]} and {name[-2]}" for name in vague)
                 what = f"{', '.join(vague)} cannot be seen from these positions and stays near zero"
                 found.append(Finding("warn", what, "", f"add positions half way between the axes {planes}"))
-        if fit.freedom < 3:
+        alone = np.flatnonzero(used & (sigmas > ALONE * self.gravity)) + 1
+        if len(alone):
+            which = ", ".join(str(k) for k in alone)
+            what = f"nothing checks dwell{'s' * (len(alone) > 1)} {which}: without it an axis is open"
+            found.append(Finding("warn", what, "", "hold such a position once more"))
+        elif fit.freedom < 3:
             unknowns = 9 if self.shears else 6
             what = f"{int(used.sum())} dwells for {unknowns} unknowns: hardly anything is left to check"
             found.append(Finding("warn", what, "", "record 15 positions or more"))

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Model = Callable[
     [Array], tuple[Array, Array]
 ]  # parameters (p,) to residuals (m,) and their derivative (m, p)
-ITERATIONS = 100
+ITERATIONS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -62,8 +62,12 @@ class StillDetector:
             )
         variance = window_variance(values, self.samples(recording))
         rest = self._rest(variance, recording)
-        factor = _parting(variance / rest) if self.factor is None else self.factor
+        factor = self._factor(variance / rest) if self.factor is None else self.factor
         return variance, rest, factor * rest
+
+    def _factor(self, ratio: Array) -> float:
+        """Where still and moving windows part best, from 3 to 100."""
+        return float(np.clip(10 ** _split(np.log10(np.clip(ratio, 0.1, 1e7))), 3.0, 100.0))
 
     def samples(self, recording: ImuRecording) -> int:
         """Samples of one window."""
@@ -77,7 +81,9 @@ class StillDetector:
     def _rest(self, variance: Array, recording: ImuRecording) -> float:
         tiny = 1e-12 * float(variance.max()) + 1e-30  # a simulated sensor may be noiseless
         if self.initial is None:
-            return max(float(np.exp(_mode(np.log(variance + tiny), 0.05))), tiny)
+            logs = np.log(variance + tiny)
+            lower = logs[logs <= _split(logs)]  # motion may be more common than rest
+            return max(float(np.exp(_mode(lower, 0.05))), tiny)
         inside = recording.seconds <= self.initial
         if inside.sum() < 2 * self.samples(recording):
             raise DataError(f"initial = {self.initial:g} s is less than two windows of {self.window:g} s")
@@ -148,19 +154,16 @@ def _mode(values: Array, enough: float = 0.0) -> float:
     return float(np.median(ordered))
 
 
-def _parting(ratio: Array, bins: int = 128) -> float:
-    """Ratio to the level of rest that parts still from moving windows best (Otsu), from 3 to 100."""
-    logs = np.log10(np.clip(ratio, 0.1, 1e7))
-    counts, edges = np.histogram(logs, bins)
+def _split(values: Array, bins: int = 128) -> float:
+    """Value that parts low from high ones best (Otsu); the largest where there is one level only."""
+    counts, edges = np.histogram(values, bins)
     middle = (edges[1:] + edges[:-1]) / 2
     low = np.cumsum(counts)
     high = low[-1] - low
     total = np.cumsum(counts * middle)
     with np.errstate(divide="ignore", invalid="ignore"):
         between = low * high * (total / low - (total[-1] - total) / high) ** 2
-    if not np.isfinite(between).any():
-        return 100.0  # one level only
-    return float(np.clip(10 ** middle[int(np.nanargmax(between))], 3.0, 100.0))
+    return float(middle[int(np.nanargmax(between))] if np.isfinite(between).any() else edges[-1])
 
 
 def _bridged(still: Mask, gap: int, recording: ImuRecording) -> list[tuple[int, int]]:

@@ -92,6 +92,9 @@ def test_bad_dwells_are_named_and_left_out(rng, bad):
 def test_six_positions_give_gain_and_offset(rng):
     imu, _ = recorded(SIX_POSITIONS, rng)
     done = MultiPosition(shears=False, six=True).calibrate(find_dwells(imu))
+    assert not done.checked.any()
+    assert np.isnan(done.leave_one_out_rms)
+    assert "nothing checks dwells 1, 2, 3, 4, 5, 6" in str(done.findings[0])
     assert done.calibration.matrix == pytest.approx(np.diag(np.diag(done.calibration.matrix)), abs=1e-9)
     np.testing.assert_allclose(np.diag(done.calibration.matrix), np.diag(ACCEL_MATRIX), atol=2e-3)
     np.testing.assert_allclose(done.calibration.offset, ACCEL_OFFSET, atol=2e-2)
@@ -135,6 +138,7 @@ def test_too_few_dwells(rng):
 def test_mpu6050_and_xsens(data_dir):
     done = MultiPosition().calibrate(find_dwells(mpu6050(data_dir, "example_data_calibration")))
     assert len(done.used) == 10
+    assert (done.used & done.checked).all()
     assert done.leave_one_out_rms == pytest.approx(0.0064, abs=0.001)
     assert "misalignment yx" in str(done.findings[0])
     done = MultiPosition().calibrate(find_dwells(xsens(data_dir)))

@@ -4,6 +4,7 @@ from dwell_worlds import attitudes, mpu6050, recorded, xsens
 
 from sequential.errors import DataError, MissingStreamError
 from sequential.noise import ImuNoise
+from sequential.readers import read_broad
 from sequential.sensors import (
     ImuRecording,
     StillDetector,
@@ -111,6 +112,18 @@ def test_bad_input_is_named(rng):
         find_dwells(imu, StillDetector(shortest=30.0))
     with pytest.raises(DataError, match="differ in sensors"):
         join_recordings([imu, ImuRecording(imu.t, imu.accel)])
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("trial", ["05", "07", "16", "24", "27", "34"])
+def test_rest_is_found_where_motion_is_more_common(data_dir, trial):
+    (path,) = (data_dir / "imu" / "broad").glob(f"{trial}_*.npz")
+    recording, truth = read_broad(path)
+    still = np.zeros(len(recording), dtype=bool)
+    for rows in StillDetector().find(recording):
+        still[rows] = True
+    assert truth.movement[still].mean() < 0.05
+    assert still[~truth.movement].mean() > 0.9
 
 
 @pytest.mark.data
