@@ -56,7 +56,7 @@ class AccelerometerFit:
 
     @property
     def leave_one_out_rms(self) -> float:
-        """Root mean square of `left_out` over the dwells that were used and are checked, m/s²; NaN for none."""
+        """Root mean square of `left_out` over dwells that are used and checked, m/s²; NaN for none."""
         chosen = self.left_out[self.used & self.checked]
         return float(np.sqrt(np.mean(chosen**2))) if len(chosen) else float("nan")
 
