@@ -59,7 +59,7 @@ def opened(
     found = open_recording(source, **options)
     recording = found.recording
     if only is not None:
-        left_out = {sensor: None for sensor in recording.sensors if sensor not in only}
+        left_out: dict[str, Any] = {sensor: None for sensor in recording.sensors if sensor not in only}
         if len(left_out) < len(recording.sensors):
             recording = replace(recording, **left_out)
     findings = inspect(recording)
