@@ -17,6 +17,7 @@ from sequential.sensors.dwells import Dwells, find_dwells, join_recordings
 from sequential.sensors.ellipsoid import FieldCheck, MagnetometerEllipsoid, MagnetometerFit
 from sequential.sensors.estimate import Estimate
 from sequential.sensors.ferraris import Ferraris, FerrarisFit
+from sequential.sensors.field_alignment import FieldAlignment, align_field
 from sequential.sensors.finding import Finding
 from sequential.sensors.gravity import STANDARD_GRAVITY, local_gravity
 from sequential.sensors.gyro_dwells import GyroBetweenDwells, GyroFit
@@ -45,6 +46,7 @@ __all__ = [
     "Estimate",
     "Ferraris",
     "FerrarisFit",
+    "FieldAlignment",
     "FieldCheck",
     "Finding",
     "GyroAtRest",
@@ -69,6 +71,7 @@ __all__ = [
     "StillDetector",
     "TurnFit",
     "Verification",
+    "align_field",
     "allan_deviation",
     "best_next_direction",
     "bias_at_rest",
