@@ -41,6 +41,7 @@ INLINED = (
     "kernels/handles.py",
     "kernels/slots.py",
     "kernels/poses.py",
+    "kernels/regressed.py",
     "kernels/resampling.py",
     "kernels/sensing.py",
     "kernels/unscented.py",
