@@ -27,7 +27,7 @@ DISTRUST = 0.25  # weight below which a reading of the field counts as disturbed
 class AttitudeSmoother:
     """Iterated smoothing of orientation, gyro errors and velocity from a whole recording.
 
-    The gyro is integrated over nodes of a tenth of a second.  The chain of nodes knows the specific force
+    The gyro is integrated over nodes of a fifth of a second.  The chain of nodes knows the specific force
     (a body that does not run away has a velocity about zero, so the mean force over a few seconds points
     up), the magnetometer through the east component of the field alone (strength and dip say how far to
     trust it), and moments of rest, found with hindsight.  Bias, gain and misalignment of the gyro, bias of

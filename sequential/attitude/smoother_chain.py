@@ -16,7 +16,7 @@ __all__ = ["AttitudeChain", "ChainSolution", "attitude_chain"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-SIZE = 23
+SIZE, MOVING = 23, 10
 GAP = 3.0  # median intervals without a sample
 LONGEST_FIELD = 1.0  # s that one reading of a slow magnetometer stands for
 START = 0.5  # s at the beginning whose mean gives the first orientation
@@ -87,7 +87,9 @@ class AttitudeChain:
         rotation, state = np.empty((count + 1, 3, 3)), np.empty((count + 1, SIZE))
         if around is not None:
             rotation[:], state[:] = around.rotation, around.state
-        prior, start = np.zeros(SIZE), self.start if around is None or field else rotation[0].copy()
+            state[:, MOVING:] = around.state[-1, MOVING:]
+        start = self.start if around is None else self.beginning(rotation[0], field=field)
+        prior = np.zeros(SIZE)
         prior[3:6] = self.bias
         deviation, cov = np.empty((count + 1, SIZE)), np.empty((count + 1, SIZE, SIZE))
         gains = np.empty((count, 7, SIZE + 2))
@@ -105,6 +107,18 @@ class AttitudeChain:
             deviation, cov, smoothed, end,
         )  # fmt: skip
         return ChainSolution(rotation, state, smoothed, cov, end, given * trust if field else np.zeros(count))
+
+    def beginning(self, rotation: Array, *, field: bool) -> Array:
+        """(3, 3) mean of the prior, for a pass about a trajectory that begins with `rotation`.
+
+        Without a field the heading at the start is a choice; that of the trajectory is kept.
+        """
+        if field:
+            return self.start
+        ahead, own = rotation @ self.start.T, self.start
+        angle = np.arctan2(ahead[1, 0] - ahead[0, 1], ahead[0, 0] + ahead[1, 1])
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
 
     def weights(self, solution: ChainSolution) -> Array:
         """(K,) trust in each reading of the field, judged with a solution in hand (Geman and McClure).

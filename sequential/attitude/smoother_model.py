@@ -50,27 +50,27 @@ class AttitudeModel:
     gravity : m/s²
     """
 
-    interval: float = 0.1
+    interval: float = 0.2
     gyro_noise: float = math.radians(0.02)
-    gyro_scale_noise: float = 0.001
+    gyro_scale_noise: float = 0.0007
     gyro_bias_walk: float = math.radians(0.01)
     gyro_bias_sigma: float = math.radians(2.0)
-    gyro_matrix_sigma: float = 0.002
-    accel_noise: float = 0.02
-    accel_bias_sigma: float = 0.04
-    speed_spread: float = 5.0
+    gyro_matrix_sigma: float = 0.003
+    accel_noise: float = 0.01
+    accel_bias_sigma: float = 0.017
+    speed_spread: float = 3.0
     rest_gyro_noise: float = math.radians(0.01)
     rest_turn: float = math.radians(0.005)
     rest_speed: float = 0.005
-    mag_noise: float = 0.025
-    disturbance_sigma: float = 0.02
+    mag_noise: float = 0.03
+    disturbance_sigma: float = 0.016
     disturbance_time: float = 5.0
     delay_sigma: float = 0.02
     mag_scatter: float = 0.18
     mag_gate: float = 3.0
-    heading_sigma: float = 0.0
-    latency: float = 0.0024
-    latency_sigma: float = 0.0005
+    heading_sigma: float = math.radians(2.0)
+    latency: float = 0.002
+    latency_sigma: float = 0.001
     gravity: float = 9.80665
 
     def __post_init__(self) -> None:
