@@ -78,6 +78,7 @@ BESIDE = (
     "attitude.smoother_forward_kernel",
     "attitude.smoother_backward_kernel",
     "attitude.smoother_dense_kernel",
+    "attitude.smoother_rows_kernel",
     "attitude.error_state_tilt_kernel",
     "attitude.error_state_heading_kernel",
     "attitude.error_state_step_kernel",

@@ -1,6 +1,7 @@
 """Factor graphs from the same declarations; the only room that imports GTSAM."""
 
+from factorlab.graph.attitude import AttitudeGraph
 from factorlab.graph.batch import BatchGraph
 from factorlab.graph.incremental import FixedLagGraph, IncrementalGraph
 
-__all__ = ["BatchGraph", "FixedLagGraph", "IncrementalGraph"]
+__all__ = ["AttitudeGraph", "BatchGraph", "FixedLagGraph", "IncrementalGraph"]

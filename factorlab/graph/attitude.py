@@ -14,7 +14,8 @@ from factorlab.graph.keys import STATIC, X
 from factorlab.graph.solve import readable
 from sequential.attitude.history import AttitudeHistory
 from sequential.attitude.smoother import AttitudeSmoother, attitude_history
-from sequential.attitude.smoother_chain import AttitudeChain, ChainSolution, attitude_chain
+from sequential.attitude.smoother_chain import AttitudeChain, ChainSolution
+from sequential.attitude.smoother_cut import attitude_chain
 from sequential.attitude.smoother_model import AttitudeModel
 from sequential.sensors.recording import ImuRecording
 
@@ -65,7 +66,8 @@ class AttitudeGraph:
         if self.magnetometer:
             recording.require("mag", si=False)
         chain = attitude_chain(recording, self.model, field=self.magnetometer is not False)
-        return attitude_history(recording, chain, self.solve(chain), None, self.name)
+        chain, solution = self._twin().first_pass(chain)
+        return attitude_history(recording, chain, self.solve(chain, solution), None, self.name)
 
     def estimate_many(
         self, recordings: Iterable[ImuRecording], threads: int | None = None
@@ -76,9 +78,9 @@ class AttitudeGraph:
         """
         return [self.estimate(one) for one in recordings]
 
-    def solve(self, chain: AttitudeChain) -> ChainSolution:
-        """Gauss-Newton by GTSAM, the field weighed anew at each step."""
-        solution = chain.solve(weight=chain.first_weights() if chain.field else None, covariance=False)
+    def solve(self, chain: AttitudeChain, about: ChainSolution) -> ChainSolution:
+        """Gauss-Newton by GTSAM from a solution, the field weighed anew at each step."""
+        solution = about
         weight = np.zeros(len(chain.nodes))
         for _ in range(self.iterations):
             if chain.field:
@@ -109,7 +111,7 @@ class LinearAttitudeGraph:
         before, here = np.empty((2, count, ROWS, MOVING))
         static, right = np.empty((count, ROWS, CONSTANTS)), np.empty((count, ROWS))
         whitened_rows(
-            chain.nodes, chain.rest, np.ascontiguousarray(weight), chain.model.settings(), chain.field,
+            chain.nodes, chain.rest, np.ascontiguousarray(weight), chain.settings, chain.field,
             self.rotation, self.state, before, here, static, right,
         )  # fmt: skip
         self.keys = [X(k) for k in range(count)]

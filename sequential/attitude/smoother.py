@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.attitude.estimator import in_threads
-from sequential.attitude.history import AttitudeHistory
-from sequential.attitude.smoother_chain import AttitudeChain, ChainSolution, attitude_chain
+from sequential.attitude.history import AttitudeHistory, read_only
+from sequential.attitude.smoother_chain import AttitudeChain, ChainSolution
+from sequential.attitude.smoother_cut import attitude_chain
 from sequential.attitude.smoother_model import AttitudeModel
 from sequential.errors import ModelError
 from sequential.sensors.recording import ImuRecording
@@ -72,7 +73,8 @@ class AttitudeSmoother:
         if self.magnetometer:
             recording.require("mag", si=False)
         chain = attitude_chain(recording, self.model, field=self.magnetometer is not False)
-        solution = self.solve(chain)
+        chain, solution = self.first_pass(chain)
+        solution = self.solve(chain, solution)
         free = None
         if chain.field and self.free_heading:
             free = chain.solve(solution, field=False)
@@ -84,9 +86,15 @@ class AttitudeSmoother:
         """Every recording by `estimate`, in threads: as many as there are processors unless given."""
         return in_threads(self.estimate, recordings, threads)
 
-    def solve(self, chain: AttitudeChain) -> ChainSolution:
-        """First pass, then passes about it with the field weighed anew each time."""
-        solution = chain.solve(weight=chain.first_weights() if chain.field else None, covariance=False)
+    def first_pass(self, chain: AttitudeChain) -> tuple[AttitudeChain, ChainSolution]:
+        """Filter and smooth from nothing; also the chain, integrated anew with the bias that this found."""
+        weight = chain.first_weights() if chain.field else None
+        solution = chain.solve(weight=weight, covariance=False)
+        return chain.integrated(solution.state[:, 3:6].mean(axis=0)), solution
+
+    def solve(self, chain: AttitudeChain, about: ChainSolution) -> ChainSolution:
+        """Passes about a solution, with the field weighed anew each time."""
+        solution = about
         for left in range(self.iterations, 0, -1):
             weight = chain.weights(solution) if chain.field else None
             solution = chain.solve(solution, weight=weight, covariance=left == 1)
@@ -101,9 +109,14 @@ def attitude_history(
     name: str,
 ) -> AttitudeHistory:
     """Give every sample its orientation from the nodes around it."""
-    q, cov, bias, bias_cov = _dense(chain, solution, heading=chain.field)
-    unaided, unaided_cov = (None, None) if free is None else _dense(chain, free, heading=False)[:2]
+    q, cov = _dense(chain, solution, heading=chain.field)
+    unaided, unaided_cov = (None, None) if free is None else _dense(chain, free, heading=False)
     samples = np.diff(chain.first)
+    bias = np.repeat(solution.state[:-1, 3:6], samples, axis=0)
+    bias_cov = np.repeat(solution.cov[:-1, 3:6, 3:6], samples, axis=0)
+    rest = np.repeat(chain.rest, samples)
+    disturbed = np.repeat(solution.trust < DISTRUST, samples) if chain.field else None
+    read_only(q, cov, unaided, unaided_cov, bias, bias_cov, rest, disturbed)
     return AttitudeHistory(
         recording.t,
         q,
@@ -112,21 +125,20 @@ def attitude_history(
         cov_6d=unaided_cov if chain.field else cov,
         gyro_bias=bias,
         gyro_bias_cov=bias_cov,
-        rest=np.repeat(chain.rest, samples),
-        magnetic_disturbance=np.repeat(solution.trust < DISTRUST, samples) if chain.field else None,
+        rest=rest,
+        magnetic_disturbance=disturbed,
         name=name,
     )
 
 
-def _dense(chain: AttitudeChain, solution: ChainSolution, *, heading: bool) -> tuple[Array, ...]:
+def _dense(chain: AttitudeChain, solution: ChainSolution, *, heading: bool) -> tuple[Array, Array]:
     from sequential.attitude.smoother_dense_kernel import densify
 
-    count, model = len(chain.gyro), chain.model
+    count, model = len(chain.samples.gyro), chain.model
     q, cov = np.empty((count, 4)), np.empty((count, 3, 3))
-    bias, bias_cov = np.empty((count, 3)), np.empty((count, 3, 3))
     extra = np.array([0.0, 0.0, model.heading_sigma**2 if heading else 0.0])
     densify(
-        chain.dt, chain.gyro, chain.first, chain.rest, solution.rotation, solution.state, solution.cov,
-        model.latency, model.latency_sigma, extra, q, cov, bias, bias_cov,
+        chain.samples.dt, chain.samples.gyro, chain.first, chain.rest, solution.rotation, solution.state,
+        solution.cov, model.latency, model.latency_sigma, extra, q, cov,
     )  # fmt: skip
-    return q, cov, bias, bias_cov
+    return q, cov

@@ -1,29 +1,21 @@
-"""A recording as a chain of nodes, and its solution by filtering and smoothing."""
+"""The chain of nodes that the attitude smoothers solve, and its solution by filtering and smoothing."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sequential.attitude.smoother_model import AttitudeModel
-from sequential.errors import DataError, MissingStreamError
-from sequential.sensors.recording import ImuRecording
 
-__all__ = ["AttitudeChain", "ChainSolution", "attitude_chain"]
+__all__ = ["AttitudeChain", "ChainSamples", "ChainSolution", "integrate"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 SIZE, MOVING = 23, 10
-GAP = 3.0  # median intervals without a sample
 LONGEST_FIELD = 1.0  # s that one reading of a slow magnetometer stands for
-START = 0.5  # s at the beginning whose mean gives the first orientation
-STILL_RATE, STILL_RIPPLE, STILL_ACCEL = np.radians(2.5), np.radians(1.0), 0.25
-STILL_GYRO_NOISE, STILL_ACCEL_NOISE = np.radians(2.5), 0.5  # standard deviations within a node
-STILL_REACH = 0.5  # s on either side
-STUCK_RATE = 0.5  # rad/s of turning in which a field must change
 
 
 class ChainSolution(NamedTuple):
@@ -37,6 +29,16 @@ class ChainSolution(NamedTuple):
     trust: Array  # (K,) of the field in this solution, 0 to 1
 
 
+class ChainSamples(NamedTuple):
+    """What a recording gives the nodes: N samples."""
+
+    dt: Array  # (N,) time that each one is integrated over, s
+    lost: Array  # (N,) what a gap before it leaves unknown, s
+    gyro: Array  # (N, 3)
+    accel: Array  # (N, 3)
+    mag: Array  # (N, 3) in units of the usual norm; NaN where there is no reading
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class AttitudeChain:
     """Preintegrated nodes with everything that a solver needs.
@@ -44,10 +46,10 @@ class AttitudeChain:
     Parameters
     ----------
     model : noises
-    dt : (N,) time that each sample is integrated over, s
-    gyro : (N, 3)
+    samples : that the nodes were made of
     first : (K + 1,) first sample of each node, and N
     nodes : (K, 66), columns of `smoother_nodes_kernel`
+    reference : (3,) gyro bias that they were integrated with
     rest : (K,)
     bias : (3,) guess of the gyro's bias, to begin with
     start : (3, 3) rotation, to begin with
@@ -55,14 +57,23 @@ class AttitudeChain:
     """
 
     model: AttitudeModel
-    dt: Array
-    gyro: Array
+    samples: ChainSamples
     first: NDArray[np.int64]
     nodes: Array
+    reference: Array
     rest: Flags
     bias: Array
     start: Array
     field: bool
+
+    @property
+    def settings(self) -> Array:
+        """(18,) what the compiled loops take."""
+        return np.concatenate([self.model.settings(), self.reference])
+
+    def integrated(self, bias: Array) -> AttitudeChain:
+        """The same chain, its nodes integrated with another gyro bias (3,)."""
+        return replace(self, nodes=integrate(self.samples, self.first, bias), reference=bias)
 
     def solve(
         self,
@@ -96,7 +107,7 @@ class AttitudeChain:
         by_gyro, by_push = np.empty((count, 3, 12)), np.empty((count, 3, 6))
         rows, trust = np.zeros((count, 5)), np.ones(count)
         given = np.ones(count) if weight is None else np.ascontiguousarray(weight)
-        settings, start_cov = self.model.settings(), self.model.prior(heading=field)
+        settings, start_cov = self.settings, self.model.prior(heading=field)
         forward(
             self.nodes, self.rest, given, settings, start, prior, start_cov, field,
             around is not None, rotation, state, deviation, cov, gains, by_gyro, by_push, rows, trust,
@@ -150,106 +161,10 @@ class AttitudeChain:
         return np.where(self.nodes[:, FIELD_TIME] > 0, 1.0 / (1.0 + square) ** 2, 0.0)
 
 
-def attitude_chain(recording: ImuRecording, model: AttitudeModel, *, field: bool = True) -> AttitudeChain:
-    """Cut a recording into nodes.
+def integrate(samples: ChainSamples, first: NDArray[np.int64], bias: Array) -> Array:
+    """(K, 66) nodes of samples, with a bias (3,) taken off the gyro."""
+    from sequential.attitude.smoother_nodes_kernel import WIDTH, summarise
 
-    Raises
-    ------
-    MissingStreamError, DataError
-    """
-    from sequential.attitude.smoother_nodes_kernel import RATE, WIDTH, summarise
-
-    recording.require("gyro", "accel")
-    gyro, accel = recording.gyro, recording.accel
-    if gyro is None or accel is None:  # for the type checker: `require` has raised
-        raise MissingStreamError("an attitude smoother needs gyro and accelerometer")
-    if len(recording) < 2:
-        raise DataError(f"recording {recording.name!r} holds one sample; there is no motion to smooth")
-    dt, lost = _intervals(recording)
-    mag = _field(recording) if field else None
-    stride = max(1, round(model.interval / float(np.median(dt))))
-    first = np.append(np.arange(0, len(dt), stride), len(dt)).astype(np.int64)
     nodes = np.empty((len(first) - 1, WIDTH))
-    read = np.full(gyro.shape, np.nan) if mag is None else mag
-    summarise(dt, lost, gyro, accel, read, first, np.zeros(3), LONGEST_FIELD, nodes)
-    rest = _still(nodes)
-    bias = nodes[rest, RATE : RATE + 3].mean(axis=0) if rest.any() else np.zeros(3)
-    start = _start(nodes[: max(1, round(START / model.interval))])
-    return AttitudeChain(model, dt, gyro, first, nodes, rest, bias, start, mag is not None)
-
-
-def _intervals(recording: ImuRecording) -> tuple[Array, Array]:
-    """(N,) time that each sample is integrated over, and (N,) what a gap before it leaves unknown, s."""
-    dt = recording.dt
-    usual = float(np.median(dt))
-    dt = np.concatenate([[usual], dt])
-    gap = dt > GAP * usual
-    return np.where(gap, usual, dt), np.where(gap, dt - usual, 0.0)
-
-
-def _field(recording: ImuRecording) -> Array | None:
-    """(N, 3) in units of the usual norm, NaN where there is no reading; None without a magnetometer.
-
-    Raises
-    ------
-    DataError
-        where the body turns and the field does not.
-    """
-    mag, turning = recording.mag, recording.gyro
-    if mag is None or turning is None:
-        return None
-    norm = np.linalg.norm(mag, axis=1)
-    known = np.isfinite(norm) & (norm > 0)
-    if not known.any():
-        return None
-    if known.sum() > 2 and np.all(np.ptp(mag[known], axis=0) == 0) and np.ptp(turning) > STUCK_RATE:
-        msg = (
-            f"mag of recording {recording.name!r} never changes although the gyro turns: the magnetometer is "
-            "stuck; give the recording without it for a heading that starts at an arbitrary direction"
-        )
-        raise DataError(msg)
-    return np.where(known[:, None], mag / np.median(norm[known]), np.nan)
-
-
-def _still(nodes: Array) -> Flags:
-    """(K,) nodes amid others in which neither gyro nor accelerometer departs from its mean."""
-    from sequential.attitude.smoother_nodes_kernel import ACCEL, ACCEL_VAR, GYRO_VAR, RATE, TIME
-
-    reach = max(1, round(STILL_REACH / float(np.median(nodes[:, TIME]))))
-    if len(nodes) < 2 * reach + 1:
-        return np.zeros(len(nodes), dtype=np.bool_)
-    rate, pull = _departure(nodes[:, RATE : RATE + 3], reach), _departure(nodes[:, ACCEL : ACCEL + 3], reach)
-    mean = np.linalg.norm(_sliding(nodes[:, RATE : RATE + 3], reach), axis=1)
-    calm = (mean < STILL_RATE) & (rate < STILL_RIPPLE) & (pull < STILL_ACCEL)
-    calm &= (nodes[:, GYRO_VAR] < STILL_GYRO_NOISE**2) & (nodes[:, ACCEL_VAR] < STILL_ACCEL_NOISE**2)
-    padded = np.pad(calm, reach, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
-    return np.ascontiguousarray(windows.all(axis=1))
-
-
-def _sliding(values: Array, reach: int) -> Array:
-    """(K, 3) mean over `reach` rows on either side, the outermost repeated."""
-    padded = np.pad(values, ((reach + 1, reach), (0, 0)), mode="edge")
-    padded[0] = 0.0
-    total = np.cumsum(padded, axis=0)
-    return (total[2 * reach + 1 :] - total[: -2 * reach - 1]) / (2 * reach + 1)
-
-
-def _departure(values: Array, reach: int) -> Array:
-    """(K,) distance of each row from the mean around it."""
-    return np.asarray(np.linalg.norm(values - _sliding(values, reach), axis=1))
-
-
-def _start(nodes: Array) -> Array:
-    """(3, 3) rotation of the first node: up by the mean specific force, north by the mean field or any."""
-    from sequential.attitude.smoother_nodes_kernel import ACCEL, FIELD, FIELD_TIME
-
-    up = nodes[:, ACCEL : ACCEL + 3].mean(axis=0)
-    size = float(np.linalg.norm(up))
-    up = up / size if size > 0 else np.array([0.0, 0.0, 1.0])
-    seen = nodes[nodes[:, FIELD_TIME] > 0, FIELD : FIELD + 3]
-    east = np.cross(seen.mean(axis=0), up) if len(seen) else np.zeros(3)
-    if np.linalg.norm(east) < 1e-3:
-        east = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
-    east /= np.linalg.norm(east)
-    return np.stack([east, np.cross(up, east), up])
+    summarise(*samples, first, np.ascontiguousarray(bias), LONGEST_FIELD, nodes)
+    return nodes

@@ -40,60 +40,53 @@ def quaternion(r, q):
         q[m] /= length
 
 
-@njit(types.void(f1, f2, i1, b1, f3, f2, f3, f0, f0, f1, w2, w3, w2, w3), **compiled)
-def densify(
-    dt, gyro, first, rest, rotation, state, smoothed, latency, latency_sigma, extra, q, cov, bias, bias_cov
-):  # fmt: skip
-    """Fill q (N, 4), cov (N, 3, 3), bias (N, 3), bias_cov (N, 3, 3) between nodes.
+@njit(types.void(f2, w2, w1, f0, w2), **compiled)
+def in_body(c, r, w, latency_variance, out):
+    """out ← Rᵀ C R + σ² w wᵀ: a covariance about the axes of the world, seen in the body."""
+    for i in range(3):
+        x = c[0, 0] * r[0, i] + c[0, 1] * r[1, i] + c[0, 2] * r[2, i]
+        y = c[1, 0] * r[0, i] + c[1, 1] * r[1, i] + c[1, 2] * r[2, i]
+        z = c[2, 0] * r[0, i] + c[2, 1] * r[1, i] + c[2, 2] * r[2, i]
+        for j in range(i + 1):
+            value = r[0, j] * x + r[1, j] * y + r[2, j] * z + latency_variance * w[i] * w[j]
+            out[i, j] = out[j, i] = value
+
+
+@njit(types.void(f1, f2, i1, b1, f3, f2, f3, f0, f0, f1, w2, w3), **compiled)
+def densify(dt, gyro, first, rest, rotation, state, smoothed, latency, latency_sigma, extra, q, cov):
+    """Fill q (N, 4) and cov (N, 3, 3) between nodes.
 
     Inside a node the gyro leads from one smoothed rotation to the next; what is left at the end is spread
     over it.  The result is `latency` seconds ahead of the gyro, by its last rate; `extra` (3,) are variances
     about the axes of the world that the chain does not know of.
     """
-    r, a, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    blend, longest = np.empty((3, 3)), 0
+    turn, blend, longest = np.empty(3), np.empty((3, 3)), 0
     for k in range(len(first) - 1):
         longest = max(longest, first[k + 1] - first[k])
-    rates = np.empty((longest, 3))
+    rates, path = np.empty((longest, 3)), np.empty((longest + 1, 3, 3))
+    variance = latency_sigma * latency_sigma
     for k in range(len(first) - 1):
-        begin, end = first[k], first[k + 1]
-        x = state[k]
-        r[:, :] = rotation[k]
-        for s in range(begin, end):
-            w = rates[s - begin]
+        begin, count, x = first[k], first[k + 1] - first[k], state[k]
+        path[0] = rotation[k]
+        for s in range(count):
+            w, g, r = rates[s], gyro[begin + s], path[s + 1]
             for i in range(3):
-                w[i] = gyro[s, i] - x[BIAS + i]
-            if rest[k]:
-                w[:] = 0.0
-            else:
-                for i in range(3):
-                    m = MATRIX + 3 * i
-                    w[i] -= x[m] * gyro[s, 0] + x[m + 1] * gyro[s, 1] + x[m + 2] * gyro[s, 2]
-            turned(r, dt[s] * w[0], dt[s] * w[1], dt[s] * w[2])
-        difference(rotation[k + 1], r, turn)
-        r[:, :] = rotation[k]
-        for s in range(begin, end):
-            w = rates[s - begin]
-            share = (s - begin + 1.0) / (end - begin)
-            turned(r, dt[s] * w[0], dt[s] * w[1], dt[s] * w[2])
-            a[:, :] = r
-            retract(a, share * turn[0], share * turn[1], share * turn[2])
-            turned(a, latency * w[0], latency * w[1], latency * w[2])
-            quaternion(a, q[s])
+                m = MATRIX + 3 * i
+                w[i] = g[i] - x[BIAS + i] - x[m] * g[0] - x[m + 1] * g[1] - x[m + 2] * g[2]
+                if rest[k]:
+                    w[i] = 0.0
+                for j in range(3):
+                    r[i, j] = path[s, i, j]
+            h = dt[begin + s]
+            turned(r, h * w[0], h * w[1], h * w[2])
+        difference(rotation[k + 1], path[count], turn)
+        for s in range(count):
+            w, r, share = rates[s], path[s + 1], (s + 1.0) / count
+            retract(r, share * turn[0], share * turn[1], share * turn[2])
+            turned(r, latency * w[0], latency * w[1], latency * w[2])
+            quaternion(r, q[begin + s])
             for i in range(3):
-                bias[s, i] = x[BIAS + i]
                 for j in range(3):
                     blend[i, j] = (1.0 - share) * smoothed[k, i, j] + share * smoothed[k + 1, i, j]
-                    bias_cov[s, i, j] = smoothed[k, 3 + i, 3 + j]
                 blend[i, i] += extra[i]
-            for i in range(3):
-                b0 = blend[0, 0] * a[0, i] + blend[0, 1] * a[1, i] + blend[0, 2] * a[2, i]
-                b1_ = blend[1, 0] * a[0, i] + blend[1, 1] * a[1, i] + blend[1, 2] * a[2, i]
-                b2 = blend[2, 0] * a[0, i] + blend[2, 1] * a[1, i] + blend[2, 2] * a[2, i]
-                for j in range(3):
-                    cov[s, i, j] = (
-                        a[0, j] * b0
-                        + a[1, j] * b1_
-                        + a[2, j] * b2
-                        + latency_sigma * latency_sigma * w[i] * w[j]
-                    )
+            in_body(blend, r, w, variance, cov[begin + s])

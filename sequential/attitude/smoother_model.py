@@ -52,7 +52,7 @@ class AttitudeModel:
 
     interval: float = 0.2
     gyro_noise: float = math.radians(0.02)
-    gyro_scale_noise: float = 0.0007
+    gyro_scale_noise: float = 0.0012
     gyro_bias_walk: float = math.radians(0.01)
     gyro_bias_sigma: float = math.radians(2.0)
     gyro_matrix_sigma: float = 0.003

@@ -58,7 +58,7 @@ def summarise(dt, lost, gyro, accel, mag, first, bias, field_limit, nodes):
         for s in range(first[k], first[k + 1]):
             h = dt[s]
             x, y, z = gyro[s, 0] - bias[0], gyro[s, 1] - bias[1], gyro[s, 2] - bias[2]
-            turned(r, 0.5 * h * x, 0.5 * h * y, 0.5 * h * z)
+            turned(r, h * x, h * y, h * z)
             n[TIME] += h + lost[s]
             n[LOST] += lost[s]
             n[ANGLE2] += (x * x + y * y + z * z) * h
@@ -85,7 +85,6 @@ def summarise(dt, lost, gyro, accel, mag, first, bias, field_limit, nodes):
                 n[ACCEL + i] += accel[s, i]
             n[GYRO_VAR] += gyro[s, 0] ** 2 + gyro[s, 1] ** 2 + gyro[s, 2] ** 2
             n[ACCEL_VAR] += accel[s, 0] ** 2 + accel[s, 1] ** 2 + accel[s, 2] ** 2
-            turned(r, 0.5 * h * x, 0.5 * h * y, 0.5 * h * z)
         count = first[k + 1] - first[k]
         for i in range(3):
             for j in range(3):

@@ -34,7 +34,7 @@ __all__ = ["difference", "east_row", "retract", "step", "step_noise"]
 ROTATION, BIAS, VELOCITY, EAST, DELAY, PULL, MATRIX, SIZE = 0, 3, 6, 9, 10, 11, 14, 23
 # settings
 (GYRO, SCALE, WALK, PUSHED, SPREAD, STILL_RATE, STILL_SPEED, MAG, DISTURBED, MEMORY, GRAVITY, GATE,
- UNKNOWN_RATE, UNKNOWN_PUSH, RESTING) = range(15)  # fmt: skip
+ UNKNOWN_RATE, UNKNOWN_PUSH, RESTING, REFERENCE) = range(16)  # fmt: skip
 
 
 @njit(types.void(w2, f0, f0, f0), **compiled)
@@ -103,7 +103,7 @@ def step(n, rest, r, x, p, r_next, x_next, by_gyro, by_push):
                 r_next[i, j] = r[i, 0] * n[TURN + j] + r[i, 1] * n[TURN + 3 + j] + r[i, 2] * n[TURN + 6 + j]
         a, b, c = 0.0, 0.0, 0.0
         for j in range(3):
-            off = x[BIAS + j]
+            off = x[BIAS + j] - p[REFERENCE + j]
             a, b, c = a + by_gyro[0, j] * off, b + by_gyro[1, j] * off, c + by_gyro[2, j] * off
         for j in range(9):
             off = x[MATRIX + j]

@@ -55,3 +55,47 @@ def test_a_setting_out_of_range_is_named():
         AttitudeModel(gyro_noise=-1.0)
     with pytest.raises(ModelError, match="iterations"):
         AttitudeSmoother(iterations=0)
+
+
+def test_backwards_in_time_is_the_same_motion(world):
+    t, truth = world
+    there = seen(t, truth, rng=np.random.default_rng(5))
+    back = ImuRecording(t, there.accel[::-1], -there.gyro[::-1], there.mag[::-1])
+    one = AttitudeSmoother(QUIET).estimate(there).world_q_body
+    other = AttitudeSmoother(QUIET).estimate(back).world_q_body[::-1]
+    # a sample's rate leads up to it; read backwards, away from it
+    assert np.degrees(attitude_error(other[1:], one[:-1]).total) < 0.2
+
+
+def test_gaps_slow_fields_and_short_recordings_are_met(world):
+    t, truth = world
+    whole = seen(t, truth, rng=np.random.default_rng(1))
+    kept = (t < 10.0) | (t > 12.0)
+    history = AttitudeSmoother(QUIET).estimate(whole.select(kept))
+    assert np.isfinite(history.cov).all()
+    # nothing is known about the two seconds, so it must start from the other sensors again
+    assert np.degrees(attitude_error(history.world_q_body, truth[kept]).total) < 3.0
+    sparse = np.where(np.arange(len(t))[:, None] % 10 == 0, whole.mag, np.nan)
+    slow = AttitudeSmoother(QUIET).estimate(ImuRecording(t, whole.accel, whole.gyro, sparse))
+    assert np.degrees(attitude_error(slow.world_q_body, truth).total) < 1.0
+    short = AttitudeSmoother(QUIET).estimate(whole.slice(0.0, 0.02))
+    assert np.isfinite(short.world_q_body).all()
+
+
+def test_a_batch_is_its_recordings_one_by_one(world):
+    t, truth = world
+    several = [seen(t, truth, rng=np.random.default_rng(k)) for k in range(3)]
+    smoother = AttitudeSmoother(QUIET)
+    for one, batched in zip(several, smoother.estimate_many(several, threads=2), strict=True):
+        np.testing.assert_array_equal(smoother.estimate(one).world_q_body, batched.world_q_body)
+
+
+def test_a_magnet_that_comes_by_is_noticed(world):
+    t, truth = world
+    recording = seen(t, truth, rng=np.random.default_rng(2))
+    near = (t > 14) & (t < 17)
+    field = recording.mag + np.where(near[:, None], [40.0, 10.0, 0.0], 0.0)
+    history = AttitudeSmoother(QUIET).estimate(ImuRecording(t, recording.accel, recording.gyro, field))
+    assert history.magnetic_disturbance[near].mean() > 0.9
+    assert history.magnetic_disturbance[~near].mean() < 0.05
+    assert np.degrees(attitude_error(history.world_q_body, truth).heading) < 1.0
