@@ -22,6 +22,7 @@ __all__ = ["Channel", "channels_of", "read_columns"]
 Array = NDArray[np.float64]
 AXES = {"accel": ("ax", "ay", "az"), "gyro": ("gx", "gy", "gz"), "mag": ("mx", "my", "mz")}
 WRITTEN = {"m/s^2": "m/s²", "uT": "µT"}  # units as people write them
+UNIT_OF_TIME = {"t": "s", "t_ns": "ns", "time_s": "s", "seconds": "s", "seconds_elapsed": "s"}
 HELD = 0.3  # share of repeated rows from which a sensor is slower than the recording
 HEADED = re.compile(r"(.+?)\s*[\[(]([^\])]*)[\])]")  # name [unit], name (unit)
 TIMES = ("t", "time", "timestamp", "seconds", "t_ns", "time_s", "seconds_elapsed", "temps", "date")
@@ -134,7 +135,8 @@ def _times(
             f"{path} has no time column ({', '.join(TIMES[:4])} …), its columns are "
             f"{', '.join(table.header)}; give the rate of the readings with --rate HZ"
         )
-    stated = time_unit or _parts(table.header[place])[1]
+    name, unit_there = _parts(table.header[place])
+    stated = time_unit or unit_there or UNIT_OF_TIME.get(name.lower())
     unit = parse_units({"t": stated} if stated else None).get("t")
     stamps, said = stamps_of(table.text(place), unit, str(path))
     rows = np.flatnonzero(stamps != NO_STAMP)

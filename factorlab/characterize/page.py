@@ -7,26 +7,26 @@ from typing import Any
 
 from factorlab.characterize.comparing import against_declared
 from factorlab.characterize.engine import Study
+from factorlab.characterize.findings import of_findings
 from factorlab.characterize.slow_verdicts import of_densities, of_slow_noise
 from factorlab.characterize.stepping import of_steps
 from factorlab.characterize.tables import sections_at_rest, sections_of_steps
 from factorlab.characterize.verdicts import at_rest
 from factorlab.characterize.words import say
-from factorlab.report.document import Document, Status, Verdict
+from factorlab.report.document import Document, Verdict
 from factorlab.report.words import Language
-from sequential.sensors import Coefficient, Finding
+from sequential.sensors import Coefficient
 from sequential.sensors.noise_fit import TERMS
 
 __all__ = ["document_of"]
 
-SEVERITY: dict[str, Status] = {"note": "INFO", "warn": "WARN", "fail": "FAIL"}
 ORDER = {"FAIL": 0, "WARN": 1, "PASS": 2, "INFO": 3}
 
 
 def document_of(study: Study, *, lang: Language = "en", command: str = "") -> Document:
     """Everything that a study has to say, worst verdicts first."""
     told = of_steps(study, lang) if study.steps else _told(study, lang)
-    verdicts = [*_findings(study.findings, lang), *told]
+    verdicts = [*of_findings(study.findings, lang), *told]
     sections = sections_of_steps(study, lang) if study.steps else sections_at_rest(study, lang)
     return Document(
         title=say(lang, "title", name=study.name),
@@ -55,14 +55,6 @@ def _lead(study: Study, lang: Language) -> str:
         return say(lang, "lead_whole", n=n, rate=rate, duration=study.duration)
     start, stop = study.window[0], min(study.window[1], study.duration)
     return say(lang, "lead_part", n=n, rate=rate, start=start, stop=stop, duration=stop - start)
-
-
-def _findings(findings: tuple[Finding, ...], lang: Language) -> Iterator[Verdict]:
-    for one in dict.fromkeys(findings):
-        where = f" ({one.where})" if one.where else ""
-        yield Verdict(
-            say(lang, "recording"), None, None, SEVERITY[one.severity], f"{one.what}{where}", one.do
-        )
 
 
 def _coefficient(one: Coefficient) -> dict[str, Any]:
