@@ -51,18 +51,11 @@ def opened(
     DataError
         where the recording cannot be read, or would give wrong results.
     """
-    from dataclasses import replace
-
     from factorlab.datasets.recordings import open_recording
     from sequential.sensors.health import failures, inspect
 
     found = open_recording(source, **options)
-    recording = found.recording
-    if only is not None:
-        left_out: dict[str, Any] = {sensor: None for sensor in recording.sensors if sensor not in only}
-        if len(left_out) < len(recording.sensors):
-            recording = replace(recording, **left_out)
-    findings = inspect(recording)
+    findings = inspect(found.recording, only=only)
     for finding in findings:
         if finding.severity != "fail" or not usable:
             click.echo(f"{finding.severity}: {finding}", err=True)

@@ -60,7 +60,7 @@ def write_kalibr_imu(
 
 
 def read_kalibr_imu(path: str | os.PathLike[str]) -> KalibrImu:
-    """Read an `imu.yaml`; what it says of other things is left alone.
+    """Read an `imu.yaml`, or EuRoC's `sensor.yaml`, which has the same names; other entries are left alone.
 
     Raises
     ------
@@ -78,12 +78,14 @@ def read_kalibr_imu(path: str | os.PathLike[str]) -> KalibrImu:
         raise FileFormatError(f"{name} is not YAML: {reason}") from None
     if not isinstance(entries, dict):
         raise FileFormatError(f"{name} holds no entries; an imu.yaml says 'gyroscope_noise_density: 0.0017'")
-    numbers = {key: _number(name, key, entries[key]) for key in (*UNITS, "update_rate") if key in entries}
+    wanted = (*UNITS, "update_rate", "rate_hz")
+    numbers = {key: _number(name, key, entries[key]) for key in wanted if key in entries}
     try:
         noise = ImuNoise.from_kalibr(numbers)
     except ModelError as fault:
         raise FileFormatError(f"{name}: {fault}") from None
-    return KalibrImu(noise, numbers.get("update_rate", math.nan), str(entries.get("rostopic", "")))
+    rate = numbers.get("update_rate", numbers.get("rate_hz", math.nan))
+    return KalibrImu(noise, rate, str(entries.get("rostopic", "")))
 
 
 def _number(name: str, key: str, value: Any) -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 from sequential.errors import DataError
 from sequential.sensors.finding import Finding
 from sequential.sensors.health.clock import clock_findings
@@ -16,7 +19,7 @@ __all__ = ["failures", "inspect"]
 ORDER = {"fail": 0, "warn": 1, "note": 2}
 
 
-def inspect(recording: ImuRecording) -> tuple[Finding, ...]:
+def inspect(recording: ImuRecording, *, only: tuple[str, ...] | None = None) -> tuple[Finding, ...]:
     """Say what is wrong with a recording, or worth knowing about it.
 
     Looked for are: what the reader mended; too few samples; pauses, lost samples, jitter and changes of the
@@ -24,14 +27,28 @@ def inspect(recording: ImuRecording) -> tuple[Finding, ...]:
     accelerometer that disagree about a turn; a recording without rest; a magnetometer that is absent,
     constant, or shows no field of the Earth.
 
+    Parameters
+    ----------
+    only : sensors to look at, of accel, gyro and mag; all of them by default
+
     Returns
     -------
     findings : failures first, then warnings, then notes; a failure says that results would be wrong
     """
     found = [*recording.findings]
-    for check in (clock_findings, reading_findings, scale_findings, rest_findings, field_findings):
+    if only is not None:
+        recording = _restricted(recording, only)
+    for check in (clock_findings, reading_findings, scale_findings, rest_findings):
         found += check(recording)
+    if only is None or "mag" in only:
+        found += field_findings(recording)
     return tuple(sorted(found, key=lambda finding: ORDER[finding.severity]))
+
+
+def _restricted(recording: ImuRecording, only: tuple[str, ...]) -> ImuRecording:
+    """The recording with these sensors, or as it is where it has none of them."""
+    left_out: dict[str, Any] = {sensor: None for sensor in recording.sensors if sensor not in only}
+    return replace(recording, **left_out) if len(left_out) < len(recording.sensors) else recording
 
 
 def failures(findings: tuple[Finding, ...], name: str = "the recording") -> DataError | None:

@@ -8,7 +8,8 @@ import pytest
 import scipy.io
 
 from sequential.errors import DataError, FileFormatError
-from sequential.readers import read_broad, read_imu, read_repoimu, write_log
+from sequential.noise import ImuNoise
+from sequential.readers import read_broad, read_imu, read_kalibr_imu, read_repoimu, write_log
 from sequential.sensors import simulate_imu, tumble
 
 RATE = 200.0
@@ -31,7 +32,11 @@ def euroc(tmp_path, truth):
     for t, w, a in zip(truth.t, truth.angular_rate.tolist(), truth.specific_force.tolist(), strict=True):
         lines.append(",".join([str(1_403_636_579_758_555_392 + int(t)), *map(repr, w), *map(repr, a)]))
     (folder / "data.csv").write_text("\r\n".join(lines) + "\r\n")
-    (folder / "sensor.yaml").write_text("sensor_type: imu\nrate_hz: 200\n")
+    (folder / "sensor.yaml").write_text(
+        "#Default imu sensor yaml file\nsensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\nrate_hz: 200\n"
+        "gyroscope_noise_density: 1.6968e-04  # [ rad / s / sqrt(Hz) ]\ngyroscope_random_walk: 1.9393e-05\n"
+        "accelerometer_noise_density: 2.0000e-3\naccelerometer_random_walk: 3.0000e-3\n"
+    )
     return tmp_path / "V1_01"
 
 
@@ -43,6 +48,12 @@ def test_euroc(euroc, truth):
         np.testing.assert_array_equal(imu.t - truth.t, 1_403_636_579_758_555_392)
         assert imu.findings == ()
     assert read_imu(euroc).name == "V1_01"
+
+
+def test_noise_of_euroc(euroc):
+    stated = read_kalibr_imu(euroc / "mav0" / "imu0" / "sensor.yaml")
+    assert stated.noise == ImuNoise(1.6968e-4, 2e-3, 1.9393e-5, 3e-3)
+    assert stated.rate == 200.0
 
 
 # --- RepoIMU ---
