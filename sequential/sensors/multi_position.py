@@ -219,9 +219,9 @@ class MultiPosition:
         if self.shears:
             vague = [NAMES[k] for k in range(3, 6) if fit.kept[k] > DOUBTFUL]
             if vague:
-                planes = " and ".join(f"{name[-1]} and {name[-2]}" for name in vague)
+                planes = ", ".join(f"{name[-1]} and {name[-2]}" for name in vague)
                 what = f"{', '.join(vague)} cannot be seen from these positions and stays near zero"
-                found.append(Finding("warn", what, "", f"add positions half way between the axes {planes}"))
+                found.append(Finding("warn", what, "", f"add positions half way between axes: {planes}"))
         alone = np.flatnonzero(used & (sigmas > ALONE * self.gravity)) + 1
         if len(alone):
             which = ", ".join(str(k) for k in alone)
