@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sequential.sensors.calibration import AffineCalibration
 from sequential.sensors.dwells import Dwells
-from sequential.sensors.gyro_integral import GyroIntervals, intervals_between, rotations, turned
+from sequential.sensors.gyro_integral import GyroIntervals, intervals_between, turned, whole_rotation
 from sequential.sensors.gyro_rest import GyroAtRest
 from sequential.sensors.recording import ImuRecording
 
@@ -107,7 +107,7 @@ class GyroCase:
     def angles(self, matrix: Array, offset: Array, accel: AffineCalibration) -> Array:
         """Angle (S,) between arriving and measured direction, rad."""
         start, end = (_unit(accel.apply(raw)) for raw in (self.before, self.after))
-        arriving = np.einsum("sji,sj->si", rotations(matrix, offset, self.intervals)[:, -1], start)
+        arriving = np.einsum("sji,sj->si", whole_rotation(matrix, offset, self.intervals), start)
         return _angle(arriving, end)
 
     def moved(self) -> Array:
@@ -162,7 +162,7 @@ def _nominal_gain(start: Array, end: Array, intervals: GyroIntervals, bias: Arra
     trial = np.geomspace(0.3, 60.0, 90) / most  # the fastest move of a hand lies between, rad/s
 
     def misfit(gain: float) -> float:
-        arriving = np.einsum("sji,sj->si", rotations(np.eye(3) * gain, bias, intervals)[:, -1], start)
+        arriving = np.einsum("sji,sj->si", whole_rotation(np.eye(3) * gain, bias, intervals), start)
         return float(np.sum(np.minimum(np.sum((arriving - end) ** 2, axis=1), 0.1)))
 
     costs = [misfit(gain) for gain in trial]

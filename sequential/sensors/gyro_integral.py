@@ -11,7 +11,7 @@ from sequential.manifold.quaternion import quaternion_exp, quaternion_multiply, 
 from sequential.manifold.so3 import right_jacobian
 from sequential.sensors.recording import ImuRecording
 
-__all__ = ["GyroIntervals", "Turned", "intervals_between", "rotations", "saturated", "turned"]
+__all__ = ["GyroIntervals", "Turned", "intervals_between", "saturated", "turned", "whole_rotation"]
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -87,10 +87,14 @@ def turned(matrix: Array, offset: Array, intervals: GyroIntervals) -> Turned:
     return Turned(q[:, -1], last, by_matrix, -weight.sum(axis=1) @ matrix)
 
 
-def rotations(matrix: Array, offset: Array, intervals: GyroIntervals) -> Array:
-    """Rotation (S, L, 3, 3) from each step's end back to the interval's start, without derivatives."""
-    phi = (intervals.raw - offset) @ matrix.T * intervals.dt[..., None]
-    return rotation_matrix(_running_product(quaternion_exp(phi)))
+def whole_rotation(matrix: Array, offset: Array, intervals: GyroIntervals) -> Array:
+    """Rotation (S, 3, 3) of each interval alone, by products of pairs, of pairs of pairs …."""
+    q = quaternion_exp((intervals.raw - offset) @ matrix.T * intervals.dt[..., None])
+    while q.shape[1] > 1:
+        odd = q[:, -1:] if q.shape[1] % 2 else q[:, :0]
+        even = q.shape[1] - odd.shape[1]
+        q = np.concatenate([quaternion_multiply(q[:, 0:even:2], q[:, 1:even:2]), odd], axis=1)
+    return rotation_matrix(q[:, 0])
 
 
 def _running_product(q: Array) -> Array:

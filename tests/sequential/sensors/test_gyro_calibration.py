@@ -27,7 +27,7 @@ from sequential.sensors import (
     verify,
 )
 from sequential.sensors.gyro_case import GyroCase
-from sequential.sensors.gyro_integral import GyroIntervals, saturated, turned
+from sequential.sensors.gyro_integral import GyroIntervals, saturated, turned, whole_rotation
 
 TRUE_ACCEL = AffineCalibration(ACCEL_MATRIX, ACCEL_OFFSET)
 
@@ -61,6 +61,10 @@ def test_a_turn_is_a_product_of_its_steps(rng):
         q = quaternion_multiply(q, quaternion_exp(raw[0, k] * dt[0, k]))
     whole = turned(np.eye(3), np.zeros(3), GyroIntervals(raw, dt, np.zeros(1, int)))
     np.testing.assert_allclose(whole.quaternion[0], q, atol=1e-13)
+    for count in (1, 2, 5, 8, 9):
+        part = GyroIntervals(raw[:, :count], dt[:, :count], np.zeros(1, int))
+        alone = whole_rotation(np.eye(3), np.zeros(3), part)
+        np.testing.assert_allclose(alone, turned(np.eye(3), np.zeros(3), part).rotation, atol=1e-13)
 
 
 def test_residuals_of_the_moves_meet_differences(rng):
