@@ -25,16 +25,19 @@ def report(s, w, p, row, out, free):
     x, y, z = half * (w[0] - s[at.BIAS]), half * (w[1] - s[at.BIAS + 1]), half * (w[2] - s[at.BIAS + 2])
     if not abs(x) + abs(y) + abs(z) < math.inf:
         x, y, z = 0.0, 0.0, 0.0
-    scale = 1.0 - 0.5 * (x * x + y * y + z * z)
+    scale = 1.0 / math.sqrt(1.0 + x * x + y * y + z * z)
     q, i, j, k = s[0] * scale, s[1] * scale, s[2] * scale, s[3] * scale
     a = q - i * x - j * y - k * z
     b = i + q * x + j * z - k * y
     c = j + q * y + k * x - i * z
     d = k + q * z + i * y - j * x
-    free[row, 0], free[row, 1], free[row, 2], free[row, 3] = a, b, c, d
     e, f = s[at.HALF], s[at.HALF + 1]
-    out[row, 0], out[row, 1] = e * a - f * d, e * b - f * c
-    out[row, 2], out[row, 3] = e * c + f * b, e * d + f * a
+    # the one of both signs whose w is not negative
+    up = math.copysign(1.0, a)
+    free[row, 0], free[row, 1], free[row, 2], free[row, 3] = up * a, up * b, up * c, up * d
+    up = math.copysign(1.0, e * a - f * d)
+    out[row, 0], out[row, 1] = up * (e * a - f * d), up * (e * b - f * c)
+    out[row, 2], out[row, 3] = up * (e * c + f * b), up * (e * d + f * a)
 
 
 @njit(types.void(w1, f1, f1, i0, w3, w3), **compiled)

@@ -113,6 +113,8 @@ def lean_upright(s, x, y, z):
 @njit(types.boolean(w1, f1, f0, f0), **compiled)
 def overturned(s, p, dt, forces):
     """Whether the force of the last while points far from up: then level by it, and begin again."""
+    if dt <= 0.0:  # two pauses in a row leave a block without duration
+        return False
     s[at.AGE] += dt
     share = dt / min(s[at.AGE], SETTLED)
     total = 0.0

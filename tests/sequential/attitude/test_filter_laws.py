@@ -1,4 +1,4 @@
-"""Laws of every recursive attitude filter."""
+"""Laws of every recursive attitude filter, and of those whose state is a quaternion and little more."""
 
 import math
 from dataclasses import replace
@@ -9,6 +9,7 @@ from attitude_worlds import FIELD, RATE, seen, still, swinging
 
 from sequential.attitude import (
     ComplementaryAttitude,
+    ErrorStateAttitude,
     Madgwick,
     Mahony,
     TiltKalman,
@@ -32,14 +33,22 @@ TREMBLE = {"madgwick as published": 3e-3}  # rad: its steps do not end at the mi
 QUATERNION = [name for name in FILTERS if name != "kalman"]
 
 
-@pytest.fixture(params=FILTERS, name="filt")
-def every_filter(request):
+EVERY = {**FILTERS, "error-state": ErrorStateAttitude()}
+
+
+@pytest.fixture(params=EVERY, name="filt")
+def every_estimator(request):
+    return EVERY[request.param]
+
+
+@pytest.fixture(params=FILTERS, name="simple")
+def every_simple_filter(request):
     return FILTERS[request.param]
 
 
 @pytest.fixture(name="tremble")
 def how_far_it_trembles(filt):
-    return next((size for name, size in TREMBLE.items() if FILTERS[name] == filt), 0.0)
+    return next((size for name, size in TREMBLE.items() if FILTERS[name] is filt), 0.0)
 
 
 @pytest.fixture(params=QUATERNION, name="quaternion_filter")
@@ -82,13 +91,13 @@ def test_each_axis_turns_the_way_its_gyro_says(filt, axis):
     np.testing.assert_allclose(found.roll_pitch_yaw()[-1], angles[-1], atol=0.01)
 
 
-def test_the_length_of_gravity_and_of_the_field_says_nothing(filt, rng):
+def test_the_length_of_gravity_and_of_the_field_says_nothing(simple, rng):
     t, angles = swinging()
     one = seen(t, attitude_from_angles(angles), rng=rng)
     longer = ImuRecording(one.t, one.accel * 1.7, one.gyro, one.mag * 0.3)
-    if isinstance(filt, Mahony):  # rest is judged in m/s², so it may begin at another sample
-        filt = replace(filt, rest_time=math.inf)
-    same, other = filt.estimate(one).world_q_body, filt.estimate(longer).world_q_body
+    if isinstance(simple, Mahony):  # rest is judged in m/s², so it may begin at another sample
+        simple = replace(simple, rest_time=math.inf)
+    same, other = simple.estimate(one).world_q_body, simple.estimate(longer).world_q_body
     np.testing.assert_allclose(other, same, atol=1e-9)
 
 
@@ -145,35 +154,35 @@ def test_many_recordings_are_each_as_one_bit_for_bit(filt, rng):
             np.testing.assert_array_equal(one, other.world_q_body)
 
 
-def test_a_step_is_what_the_whole_recording_makes(filt, rng):
+def test_a_step_is_what_the_whole_recording_makes(simple, rng):
     t, angles = swinging(3.0)
     recording = seen(t, attitude_from_angles(angles), rng=rng)
-    state = filt.start(recording.gyro[0], recording.accel[0])
+    state = simple.start(recording.gyro[0], recording.accel[0])
     path = []
     for k in range(len(recording)):
         dt = (recording.t[k] - recording.t[k - 1]) * 1e-9 if k else 0.0
-        state = filt.step(state, recording.gyro[k], recording.accel[k], recording.mag[k], dt)
+        state = simple.step(state, recording.gyro[k], recording.accel[k], recording.mag[k], dt)
         path.append(state[:4])
-    if isinstance(filt, TiltKalman):
-        np.testing.assert_array_equal(np.array(path), filt.path(recording)[:, :4])
+    if isinstance(simple, TiltKalman):
+        np.testing.assert_array_equal(np.array(path), simple.path(recording)[:, :4])
     else:
         path = np.array(path)
         positive = np.copysign(1.0, path[:, :1]) * path
-        np.testing.assert_array_equal(positive, filt.estimate(recording).world_q_body)
+        np.testing.assert_array_equal(positive, simple.estimate(recording).world_q_body)
 
 
-def test_bad_samples_do_what_they_are_said_to_do(filt):
+def test_bad_samples_do_what_they_are_said_to_do(simple):
     a = np.array([0.1, 0.2, 9.7])
-    state = filt.start([0.01, 0.0, 0.02], a)
-    state = filt.step(state, [0.01, 0.0, 0.02], a, FIELD, 0.01)
+    state = simple.start([0.01, 0.0, 0.02], a)
+    state = simple.step(state, [0.01, 0.0, 0.02], a, FIELD, 0.01)
     for bad in (np.nan, np.inf):
-        np.testing.assert_array_equal(filt.step(state, [bad, 0.0, 0.0], a, FIELD, 0.01), state)
+        np.testing.assert_array_equal(simple.step(state, [bad, 0.0, 0.0], a, FIELD, 0.01), state)
     for none in (np.zeros(3), np.full(3, np.nan)):
-        free = filt.step(state, [0.1, 0.2, 0.3], none, none, 0.01)
+        free = simple.step(state, [0.1, 0.2, 0.3], none, none, 0.01)
         assert np.isfinite(free).all()
         assert not np.array_equal(free[:4], state[:4])
     for dt in (-0.01, 5.0):
-        jumped = filt.step(state, [3.0, 0.0, 0.0], a, None, dt)
+        jumped = simple.step(state, [3.0, 0.0, 0.0], a, None, dt)
         assert np.isfinite(jumped).all()
         np.testing.assert_allclose(jumped[:2], state[:2], atol=1e-9)
 
