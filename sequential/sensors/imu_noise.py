@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from sequential.errors import DataError, MissingStreamError
 from sequential.noise import ImuNoise
 from sequential.sensors.allan import AllanDeviation, allan_deviation
-from sequential.sensors.noise_fit import FEWEST, NoiseFit, fit_noise
+from sequential.sensors.noise_fit import NoiseFit, fit_noise
 from sequential.sensors.recording import ImuRecording
+from sequential.sensors.stretch import longest_even_stretch, longest_still_stretch
 
-__all__ = ["ImuNoiseReport", "imu_noise", "longest_even_stretch"]
+__all__ = ["ImuNoiseReport", "imu_noise"]
 
 Array = NDArray[np.float64]
-PAUSE = 5.5  # intervals: a few lost samples shift the noise in time, which no spectrum notices
-SAME_RATE = 1.1
-CHUNKS = 16
 UNITS = {"gyro": "rad/s", "accel": "m/s²"}
 
 
@@ -52,12 +50,13 @@ def imu_noise(recording: ImuRecording) -> ImuNoiseReport:
 
     Parameters
     ----------
-    recording : at rest, in SI units; gyro, accelerometer, or both
+    recording : at rest, in SI units; gyro, accelerometer, or both.  Where it moves now and then, the longest
+        still part counts
 
     Raises
     ------
     DataError, MissingStreamError
-        where it is not in SI units, its rate changes, or no stretch without a pause is long enough.
+        where it is not in SI units, its rate changes, or no still stretch without a pause is long enough.
 
     Notes
     -----
@@ -68,7 +67,8 @@ def imu_noise(recording: ImuRecording) -> ImuNoiseReport:
     if not sensors:
         raise MissingStreamError(f"recording {recording.name!r} has neither gyro nor accelerometer")
     recording.require(*sensors)
-    stretch, notes = longest_even_stretch(recording)
+    even, notes = longest_even_stretch(recording)
+    stretch, more = longest_still_stretch(even)
     rate = (len(stretch) - 1) / stretch.duration
     fits, deviations = {}, {}
     for name in sensors:
@@ -85,7 +85,7 @@ def imu_noise(recording: ImuRecording) -> ImuNoiseReport:
             if not seen:
                 bounds.append(f"{name}_bias_walk")
         noise = ImuNoise(**numbers)
-    return ImuNoiseReport(noise, tuple(bounds), fits, deviations, rate, stretch.duration, tuple(notes))
+    return ImuNoiseReport(noise, tuple(bounds), fits, deviations, rate, stretch.duration, (*notes, *more))
 
 
 def _fit_axis(values: Array, rate: float, sensor: str, axis: int, name: str) -> NoiseFit:
@@ -100,48 +100,3 @@ def _together(fits: tuple[NoiseFit, ...], term: Literal["N", "K"]) -> tuple[floa
     seen = [fit[term].value for fit in fits if fit[term].visible]
     values = seen or [fit[term].high for fit in fits]
     return float(np.sqrt(np.mean(np.square(values)))), bool(seen)
-
-
-def longest_even_stretch(recording: ImuRecording) -> tuple[ImuRecording, list[str]]:
-    """The longest part without a pause of more than five intervals, and what is to be said about the rest.
-
-    Raises
-    ------
-    DataError
-        where that part has fewer than 64 samples, or its rate changes.
-    """
-    dt = recording.dt
-    if len(dt) < FEWEST - 1:
-        raise DataError(
-            f"recording {recording.name!r} has {len(recording)} samples; reading its noise needs {FEWEST} at "
-            "least, and minutes to see more than white noise"
-        )
-    pauses = np.flatnonzero(dt > PAUSE * np.median(dt))
-    starts, stops = np.concatenate([[0], pauses + 1]), np.concatenate([pauses + 1, [len(recording)]])
-    longest = int(np.argmax(stops - starts))
-    stretch = recording.select(slice(int(starts[longest]), int(stops[longest])))
-    if len(stretch) < FEWEST:
-        raise DataError(
-            f"recording {recording.name!r} pauses {len(pauses)} times, and no stretch between has {FEWEST} "
-            "samples; record without pauses"
-        )
-    medians = np.array(
-        [np.median(part) for part in np.array_split(stretch.dt, min(CHUNKS, len(stretch) // 8))]
-    )
-    if medians.max() > SAME_RATE * medians.min():
-        raise DataError(
-            f"the rate of recording {recording.name!r} changes from {1 / medians.min():.4g} to "
-            f"{1 / medians.max():.4g} Hz; give a part of one rate, as recording.slice(start_s, stop_s)"
-        )
-    notes = []
-    if len(pauses):
-        notes.append(
-            f"The recording pauses {len(pauses)} times; the longest stretch without a pause, "
-            f"{stretch.duration:.4g} s of {recording.duration:.4g} s, was used."
-        )
-    lost = int(np.sum(np.round(stretch.dt / np.median(stretch.dt)) - 1))
-    if lost > 0.001 * len(stretch):
-        notes.append(
-            f"{lost} of {len(stretch) + lost} samples are missing; the others were taken as evenly spaced."
-        )
-    return stretch, notes

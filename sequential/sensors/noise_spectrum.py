@@ -179,6 +179,6 @@ def _lines(
     for b in np.flatnonzero(stands_out).tolist():
         if highest[b] == highest[max(b - 1, 0) : b + 2].max():
             at = edges[b] + int(np.argmax(square[edges[b] : edges[b + 1]]))
-            excess = max(mean[b] - level[b], 0.0) * bins[b]
+            excess = max((mean[b] - level[b]) * bins[b], highest[b] - level[b])
             found.append((float((at + 1) / (2 * count)), float(np.sqrt(excess / count))))
     return tuple(found), ~dropped

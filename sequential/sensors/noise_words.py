@@ -80,7 +80,8 @@ def _disturbances(fit: NoiseFit) -> list[str]:
         more = f" and {len(fit.lines) - 3} more" if len(fit.lines) > 3 else ""
         said.append(f"Something vibrates at {where}{more}; these lines were left out.")
     if fit.spikes:
-        said.append(f"{fit.spikes} lone outliers were replaced by the median around them.")
+        were = "lone outlier was" if fit.spikes == 1 else "lone outliers were"
+        said.append(f"{fit.spikes} {were} replaced by the median around.")
     if fit.smooth:
         said.append(
             "The slowest motion is smoother than a random walk, as in a warm-up or a change of temperature: "

@@ -68,6 +68,35 @@ def test_the_longest_stretch_is_used(rng):
     assert "pauses 1 times; the longest stretch without a pause, 49.99 s of 61.99 s" in report.notes[0]
 
 
+def test_where_it_moves_the_longest_still_part_is_used(rng):
+    whole = still(rng)
+    turned = np.array(whole.gyro)
+    turned[3000:3200] += np.sin(np.linspace(0.0, np.pi, 200))[:, None]
+    report = imu_noise(ImuRecording(t=whole.t, accel=whole.accel, gyro=turned, name="desk"))
+    assert "not still throughout: 32 to 120 s of 120 s was used" in report.notes[0]
+    assert report.noise.gyro_density == pytest.approx(1e-4, rel=0.02)
+
+
+@pytest.mark.parametrize("rate", [10.0, 100.0, 1000.0])
+def test_a_noisy_recording_is_still(rate, rng):
+    count = round(300 * rate)
+    gyro = np.stack(
+        [still_sensor(rng, count, rate, N=1e-3, B=1e-2, K=1e-2, Q=1e-5, R=1e-4) for _ in range(3)], 1
+    )
+    assert not imu_noise(ImuRecording(t=np.arange(count) / rate, gyro=gyro)).notes
+
+
+@pytest.mark.parametrize("sigma", [0.15, 0.2, 0.25, 0.3])
+def test_a_coarse_recording_is_still(sigma, rng):
+    gyro = 0.001 * np.round(sigma * rng.standard_normal((20_000, 3)))
+    assert not imu_noise(ImuRecording(t=np.arange(20_000) / RATE, gyro=gyro)).notes
+
+
+def moving(rng):
+    t = np.arange(3000) / RATE
+    return ImuRecording(t=t, gyro=np.sin(np.outer(t, [2.0, 3.0, 4.0])) * np.sin(t)[:, None] ** 8, name="hand")
+
+
 def test_a_few_lost_samples_are_said_and_do_no_harm(rng):
     whole = still(rng)
     kept = np.delete(np.arange(12_000), rng.choice(11_000, 60, replace=False) + 500)
@@ -113,6 +142,7 @@ def raw(rng):
         (lambda rng: still(rng, 40), DataError, "has 40 samples; reading its noise needs 64"),
         (stuck, DataError, "gyro y of recording 'desk': all 500 samples are 0.125: the axis is stuck"),
         (magnetometer, MissingStreamError, "neither gyro nor accelerometer"),
+        (moving, DataError, "recording 'hand' moves: its longest still part lasts 1 s; lay the sensor down"),
         (raw, DataError, "in counts, rad/s is needed here"),
     ],
 )

@@ -162,7 +162,7 @@ def test_lone_outliers_are_replaced_and_counted(height, rng):
     fit = fit_noise(spiked, 100.0)
     assert fit.spikes == len(set(at))
     assert fit.N.value == pytest.approx(fit_noise(x, 100.0).N.value, rel=0.01)
-    assert f"{fit.spikes} lone outliers were replaced" in " ".join(fit.notes)
+    assert f"{fit.spikes} lone outliers were replaced by" in " ".join(fit.notes)
 
 
 def test_a_warm_up_is_told_from_a_walk(rng):
