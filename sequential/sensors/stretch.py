@@ -107,7 +107,7 @@ def longest_still_stretch(recording: ImuRecording) -> tuple[ImuRecording, list[s
 
 
 def _steps(values: Array) -> Array:
-    """Smallest difference between neighbours that differ, for each axis: the resolution, or next to nothing."""
+    """Least difference between neighbours that differ, for each axis: the resolution, or nearly nothing."""
     moves = np.abs(np.diff(values, axis=0))
     least = np.where(moves > 0, moves, np.inf).min(axis=0)
     return np.asarray(np.where(np.isfinite(least), least, 0.0))
