@@ -47,7 +47,9 @@ def in_french(sentence: str) -> str:
 
 
 def _parts(text: str) -> str:
-    """Names of sensors and numbers inside a sentence."""
+    """A sentence inside a sentence, names of sensors, numbers."""
+    if (whole := in_french(text)) != text:
+        return whole
     for english, french in SENSORS.items():
         text = text.replace(english, french)
     return re.sub(r"(?<=\d)\.(?=\d)", ",", text)

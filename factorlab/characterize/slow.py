@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.characterize.channels import AXES, Channel
-from sequential.errors import FactorlabError
+from sequential.errors import DataError, FactorlabError
 from sequential.noise import ImuNoise
 from sequential.sensors import (
     AllanDeviation,
@@ -27,6 +27,7 @@ __all__ = ["SlowNoise", "slow_noise"]
 
 PAUSE = 5.5  # intervals, as in `sequential.sensors.imu_noise`
 FEWEST = 64
+PARTS, SAME_RATE = 16, 1.1
 INERTIAL = {"accel": "m/s²", "gyro": "rad/s"}
 
 
@@ -112,7 +113,16 @@ def _even_rows(t: NDArray[np.int64]) -> slice:
     pauses = np.flatnonzero(steps > PAUSE * np.median(steps))
     starts, stops = np.append(0, pauses + 1), np.append(pauses + 1, len(t))
     longest = int(np.argmax(stops - starts))
-    return slice(int(starts[longest]), int(stops[longest]))
+    rows = slice(int(starts[longest]), int(stops[longest]))
+    parts = np.array_split(np.diff(t[rows]), PARTS)
+    medians = np.array([np.median(part) for part in parts if len(part)]) * 1e-9
+    if len(medians) and medians.max() > SAME_RATE * medians.min():
+        first, last = 1.0 / medians.min(), 1.0 / medians.max()
+        raise DataError(
+            f"the rate of these readings changes from {first:.4g} to {last:.4g} Hz; "
+            "give a part of one rate with --still START:STOP"
+        )
+    return rows
 
 
 def _plain(fault: FactorlabError) -> str:

@@ -12,6 +12,7 @@ from factorlab.characterize.words import group_name, largest_of, say
 from factorlab.report.document import Status, Verdict
 from factorlab.report.words import Language, number
 from sequential.sensors import Characteristics
+from sequential.sensors.characterize_timing import Timing
 
 __all__ = ["at_rest"]
 
@@ -35,9 +36,23 @@ def at_rest(study: Study, lang: Language) -> Iterator[Verdict]:
             yield from of_level(axes, group, lang)
             for about in (of_drift, of_heat, _resolution, _normal):
                 yield from about(axes, lang)
-            for of_group in (_outliers, _timing):
-                yield of_group(axes, group, lang)
+            yield _outliers(axes, group, lang)
             yield from _line(axes, lang)
+    for groups, seen in _clocks(study):
+        yield _timing(seen, ", ".join(group_name(group, lang) for group in groups), lang)
+
+
+def _clocks(study: Study) -> Iterator[tuple[list[str], Timing]]:
+    """Sensors that share their stamps, and when those came."""
+    found: list[tuple[list[str], int]] = []
+    for group, rows in study.groups().items():
+        own = study.channels[rows[0]].t
+        same = next((g for g, k in found if np.array_equal(study.channels[k].t, own)), None)
+        if same is None:
+            found.append(([group], rows[0]))
+        else:
+            same.append(group)
+    yield from ((groups, study.axes[k].timing) for groups, k in found)
 
 
 def _stuck(one: Characteristics, lang: Language) -> Verdict:
@@ -147,8 +162,8 @@ def _outliers(axes: Axes, group: str, lang: Language) -> Verdict:
     return Verdict(metric, seen.share.value, share, status, meaning, say(lang, "outliers_do"))
 
 
-def _timing(axes: Axes, group: str, lang: Language) -> Verdict:
-    seen, metric = axes[0].timing, say(lang, "timing", group=group_name(group, lang))
+def _timing(seen: Timing, names: str, lang: Language) -> Verdict:
+    metric = say(lang, "timing", group=names)
     if seen.computed:
         return Verdict(metric, None, None, "INFO", say(lang, "timing_even", rate=seen.rate))
     share = seen.jitter * seen.rate

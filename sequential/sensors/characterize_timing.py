@@ -68,8 +68,8 @@ def timing_of(t: NDArray[np.int64]) -> Timing:
         1.0 / usual,
         (len(t) - 1) / duration,
         duration,
-        float(near.std()),
-        float(np.abs(near - usual).max()),
+        float(near.std().round(12)),  # stamps are whole nanoseconds
+        float(np.abs(near - usual).max().round(12)),
         gaps,
         int(np.sum(np.round(steps[gap] / usual) - 1.0)),
         int((steps <= 0.0).sum()),

@@ -265,3 +265,24 @@ def test_the_page_is_silent_in_a_browser(browser, log, tmp_path):
     assert "CONSOLE" not in done.stderr
     assert done.stdout.count("<svg") == 5
     assert "Variance d'Allan" in done.stdout
+
+
+def test_a_change_of_rate_leaves_no_allan_deviation(recording, tmp_path):
+    still = recording.slice(0.0, REST - 2.0)
+    t = np.where(still.seconds < 30.0, still.seconds, 30.0 + 2.5 * (still.seconds - 30.0))
+    write_imu(ImuRecording(t, still.accel, still.gyro), tmp_path / "rate.csv")
+    found = whole(tmp_path / "rate.csv")
+    assert found["imu_noise"] is None
+    assert "allan" not in found["axes"]["gx"]
+    told = [one["meaning"] for one in found["verdicts"] if one["verdict"] == "WARN"]
+    assert any("rate" in one and "changes from 50" in one for one in told)
+
+
+def test_a_pause_is_said(recording, tmp_path):
+    still = recording.slice(0.0, REST - 2.0)
+    t = still.seconds + 4.0 * (still.seconds > 30.0)
+    write_imu(ImuRecording(t, still.accel, still.gyro), tmp_path / "pause.csv")
+    found = whole(tmp_path / "pause.csv")
+    assert found["timing"]["gaps"][0] == pytest.approx([30.0, 4.02], abs=0.05)
+    assert found["timing"]["missing"] == 200
+    assert any("Gaps: 1" in one["meaning"] for one in found["verdicts"])
