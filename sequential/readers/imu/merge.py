@@ -13,11 +13,12 @@ from sequential.readers.imu.assemble import Channels
 from sequential.readers.imu.units import Scale
 from sequential.sensors.finding import Finding
 
-__all__ = ["SensorStream", "merge"]
+__all__ = ["SensorStream", "increasing", "merge"]
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 WORDS = {"accel": "accelerometer", "gyro": "gyro", "mag": "magnetometer"}
+FASTER = 1.5  # times the gyro's rate: from there on, interpolation would alias
 BRIDGED = 5.0  # median intervals: a longer pause of a stream is not interpolated over
 
 
@@ -47,7 +48,7 @@ def merge(streams: Mapping[str, SensorStream], *, where: str, name: str, finding
     FileFormatError
         where the streams have no time in common.
     """
-    clean = {sensor: _increasing(stream, sensor, findings) for sensor, stream in streams.items()}
+    clean = {sensor: increasing(stream, sensor, findings) for sensor, stream in streams.items()}
     base = next(sensor for sensor in ("gyro", "accel", "mag") if sensor in clean)
     t = clean[base].t
     arrays: dict[str, Array] = {base: clean[base].values}
@@ -77,25 +78,37 @@ def merge(streams: Mapping[str, SensorStream], *, where: str, name: str, finding
 
 
 def _told(sensor: str, base: str, streams: Mapping[str, SensorStream], lost: int) -> Finding:
+    how = (
+        "averaged over its intervals"
+        if streams[sensor].rate > FASTER * streams[base].rate
+        else "interpolated"
+    )
     left = f"; {lost} samples where it is missing are left out" if lost else ""
     what = (
         f"{WORDS[sensor]} ({streams[sensor].rate:.4g} Hz) and {WORDS[base]} ({streams[base].rate:.4g} Hz) "
-        f"have stamps of their own; the {WORDS[sensor]} is interpolated{left}"
+        f"have stamps of their own; the {WORDS[sensor]} is {how}{left}"
     )
     return Finding("note" if lost < 0.02 * len(streams[base].t) else "warn", what)
 
 
-def _increasing(stream: SensorStream, sensor: str, findings: list[Finding]) -> SensorStream:
-    """The stream without rows that hold no number, in order, each stamp once."""
+def increasing(stream: SensorStream, sensor: str, findings: list[Finding]) -> SensorStream:
+    """The stream without rows that hold no number, in order, each stamp once.
+
+    Raises
+    ------
+    FileFormatError
+        where nothing is left.
+    """
     good = np.isfinite(stream.values).all(axis=1) & (stream.t != np.iinfo(np.int64).min)
     t, first = np.unique(stream.t[good], return_index=True)
     lost = len(stream.t) - len(t)
     if not len(t):
         raise FileFormatError(
-            f"the {WORDS[sensor]} stream holds no reading; leave its file out, or record again"
+            f"the {WORDS.get(sensor, sensor)} stream holds no reading; leave its file out, or record again"
         )
     if lost or (np.diff(stream.t[good]) < 0).any():
-        what = f"{WORDS[sensor]}: stamps put in order, {lost} rows that repeat one or hold no number left out"
+        name = WORDS.get(sensor, sensor)
+        what = f"{name}: stamps put in order, {lost} rows that repeat one or hold no number left out"
         findings.append(Finding("note" if lost < 0.01 * len(t) else "warn", what))
     return SensorStream(t, stream.values[good][first], stream.unit)
 
@@ -105,7 +118,7 @@ def _onto(stream: SensorStream, t: Stamps, rate: float) -> tuple[Array, NDArray[
     if np.array_equal(stream.t, t):
         return stream.values, np.ones(len(t), dtype=bool)
     own, wanted = (stream.t - t[0]) * 1e-9, (t - t[0]) * 1e-9
-    if stream.rate > 1.5 * rate and len(t) > 2:
+    if stream.rate > FASTER * rate and len(t) > 2:
         steps = np.diff(own)[:, None]
         total = np.vstack(
             [np.zeros(3), np.cumsum(0.5 * (stream.values[1:] + stream.values[:-1]) * steps, axis=0)]

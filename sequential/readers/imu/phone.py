@@ -13,7 +13,7 @@ from sequential.readers.imu.archive import Export
 from sequential.readers.imu.assemble import Channels
 from sequential.readers.imu.clock import stamps_of
 from sequential.readers.imu.guess import FREE_FALL
-from sequential.readers.imu.merge import SensorStream, merge
+from sequential.readers.imu.merge import SensorStream, increasing, merge
 from sequential.readers.imu.text_table import TextTable, table_of
 from sequential.readers.imu.units import GRAVITY, Scale, scale_of
 from sequential.sensors.finding import Finding
@@ -136,6 +136,10 @@ def _time_unit(table: TextTable) -> Scale | None:
 def _merged(
     streams: Mapping[str, SensorStream], where: str, name: str, findings: list[Finding], *, inverted: bool
 ) -> Channels:
+    filled = {
+        what: stream for what, stream in streams.items() if np.isfinite(stream.values).all(axis=1).any()
+    }
+    streams = {what: increasing(stream, what, findings) for what, stream in filled.items()}
     chosen = {}
     if accel := _with_gravity(streams, where, findings, inverted=inverted):
         chosen["accel"] = accel

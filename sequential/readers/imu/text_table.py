@@ -134,7 +134,9 @@ def table_of(text: str, where: str, is_header: Callable[[Sequence[str]], bool]) 
         raise FileFormatError(f"{where} is empty; a recording has a header such as t,ax,ay,az,gx,gy,gz")
     at, separator, header = _header(kept, is_header)
     numbered = [(n, line) for n, line in kept[at + bool(header) :] if not line.lstrip().startswith("#")]
-    body = _plain([line for _, line in numbered], separator)
+    plain = _plain([line for _, line in numbered], separator)
+    numbered = [(n, line) for (n, _), line in zip(numbered, plain, strict=True) if line.strip()]
+    body = [line for _, line in numbered]
     if header and len(body) > 1 and not any(map(_is_number, _split(body[:1], separator)[0])):
         body, numbered = body[1:], numbered[1:]  # a second line of header: units, or axes
     if not body:
@@ -149,7 +151,7 @@ def table_of(text: str, where: str, is_header: Callable[[Sequence[str]], bool]) 
 def _plain(body: list[str], separator: str | None) -> list[str]:
     """Lines without quotes, and with decimal points."""
     if separator is not None and any('"' in line for line in body):
-        rows = csv.reader(body, delimiter=separator, skipinitialspace=True)
+        rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for line in body]
         body = [separator.join(_bare(cell, separator) for cell in cells) for cells in rows]
     if separator == ",":
         return body
@@ -191,7 +193,7 @@ def _split(lines: list[str], separator: str | None) -> list[list[str]]:
     if separator is None:
         return [line.split() for line in lines]
     if any('"' in line for line in lines):
-        return [list(row) for row in csv.reader(lines, delimiter=separator, skipinitialspace=True)]
+        return [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for line in lines]
     return [line.split(separator) for line in lines]
 
 

@@ -272,3 +272,16 @@ def test_an_export_of_something_else(tmp_path):
     broken.write_bytes(b"PK\x03\x04 not really")
     with pytest.raises(FileFormatError, match="not a zip that can be read"):
         read_imu(broken)
+
+
+def test_rows_without_numbers_and_out_of_order(android):
+    path = android / "TotalAcceleration.csv"
+    lines = path.read_text().splitlines()
+    lines[10] = lines[10].rsplit(",", 3)[0] + ",,,"
+    lines[20], lines[21] = lines[21], lines[20]
+    lines.insert(30, lines[30])
+    path.write_text("\n".join(lines))
+    (android / "Gravity.csv").write_text("time,seconds_elapsed,z,y,x\n1,2,,,\n")
+    imu = read_imu(android)
+    assert (np.diff(imu.t) > 0).all()
+    assert any("2 rows that repeat one or hold no number" in f.what for f in imu.findings)
