@@ -21,8 +21,8 @@ CONSTANTS = (
 )
 POSITIONS_READ = (
     "Calibrated mean of each position minus gravity along its axis. Both positions of an axis share it, "
-    "since the offset is their mean: what is left across the axis is a table that is not level, or faces that "
-    "are not square."
+    "since the offset is their mean: what is left across the axis is a table that is not level, or faces "
+    "that are not square."
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ FLAT, NEARLY_FLAT = 0.05, 0.25  # thickness of the readings over their width: a 
 RADIUS_KNOWN = 0.03  # relative standard deviation of a radius that is observed
 SEEN = 2.5  # spread along the thinnest direction over the noise of a reading
 PLANAR_SECTORS, RIM = 8, 0.1  # of 12; scatter of the radius that is still a rim and no disc
+EXACT = 1e-6  # scatter of a norm without any noise
+NOISE_ROUNDS, NOISE_FITS = 3, 0.9  # fits; scatter over noise under which the noise was overrated
 UNMEASURED = 0.3  # relative, of a gain that a planar turn says nothing about
 
 
@@ -133,8 +135,21 @@ class MagnetometerEllipsoid:
             UnderConstrainedError where the directions leave a gain free, naming the direction.
         """
         readings = readings_of(recording, self.noise)
-        plane, thickness = _plane(readings)
         rng = np.random.default_rng(0) if rng is None else rng
+        for _ in range(NOISE_ROUNDS if self.noise is None else 1):
+            fit, basis = self._fitted(recording, readings, rng)
+            ratio = fit.sigma / max(fit.expected, 1e-12)
+            if ratio > NOISE_FITS or fit.sigma < EXACT:
+                break
+            # outliers and quick turns look like noise in differences: no norm scatters less than its noise
+            readings = replace(readings, noise_cov=readings.noise_cov * ratio**2)
+        return self._finished(recording, readings, fit, basis)
+
+    def _fitted(
+        self, recording: ImuRecording, readings: FieldReadings, rng: np.random.Generator
+    ) -> tuple[EllipsoidFit, Array]:
+        """The ellipsoid, and the axes (3, d) that it lies in."""
+        plane, thickness = _plane(readings)
         fit, basis = None, np.eye(3)
         if self.planar is not True and thickness > FLAT and _above_noise(readings):
             fit = fit_ellipsoid(readings.points, readings.noise_cov, rng)
@@ -144,7 +159,7 @@ class MagnetometerEllipsoid:
             fit = fit if fit is not None and _goes_round(readings.points @ basis, fit) else None
         if fit is None or not _observed(fit):
             raise UnderConstrainedError(weakest(readings.points, fit, basis, recording.name))
-        return self._finished(recording, readings, fit, basis)
+        return fit, basis
 
     def _finished(
         self, recording: ImuRecording, readings: FieldReadings, fit: EllipsoidFit, basis: Array

@@ -26,8 +26,9 @@ BIWEIGHT = 4.685  # 95 % efficient where there is no outlier
 TO_SIGMA = 1.482602218505602  # of a median absolute deviation
 STEPS, FULL_STEPS = 60, 15
 SETTLED, NEARLY = 1e-7, 1e-3  # of a standard deviation
+EXACT = 1e-11  # of a gain, of a radius: where there is no noise
 LOOSE = 0.02  # relative standard deviation of a gain that the points hardly know
-BLOCKS = 200
+BLOCKS, LONG_BLOCKS, WANDERS = 200, 20, 1.4
 SUBSETS, SUBSET = 80, 25
 NEAR = 0.9  # median distance over noise (0.67 without outliers) at which none need be looked for
 
@@ -99,7 +100,7 @@ def fit_ellipsoid(points: Array, noise_cov: Array, rng: np.random.Generator) -> 
         root, centre = _moved(root, centre, step if k < FULL_STEPS else step / 2)
         if np.linalg.eigvalsh(root)[0] <= 0:
             return None
-        if np.abs(step / scale).max() < SETTLED:
+        if (np.abs(step) < np.maximum(SETTLED * scale, EXACT * _reach(root))).all():
             return _finished(points, noise_cov, root, centre)
     if np.abs(step / scale).max() < NEARLY:
         return _finished(points, noise_cov, root, centre)
@@ -211,6 +212,22 @@ def _moved(root: Array, centre: Array, step: Array) -> Ellipsoid:
     return moved, shifted
 
 
+def _score_cov(score: Array) -> Array:
+    """Covariance (p, p) of the sum of the scores (N, p), from sums over blocks of neighbours.
+
+    A field that changes over minutes shows in blocks so long that few are left; they scatter too much to stand
+    for every parameter, and raise the whole covariance where they agree that it is too small.
+    """
+    short, long = (_block_cov(score, count) for count in (BLOCKS, LONG_BLOCKS))
+    ratio = float(np.mean(np.diag(long) / np.maximum(np.diag(short), 1e-300)))
+    return short * ratio if len(score) > 2 * BLOCKS and ratio > WANDERS else short
+
+
+def _block_cov(score: Array, count: int) -> Array:
+    sums = np.add.reduceat(score, np.arange(0, len(score), max(1, len(score) // count)), axis=0)
+    return np.asarray(len(sums) / max(1, len(sums) - 1) * sums.T @ sums)
+
+
 def _finished(points: Array, noise_cov: Array, root: Array, centre: Array) -> EllipsoidFit:
     residuals, derivative, biweight, sigma = _weighed(points, noise_cov, root, centre)
     score = derivative * (biweight / sigma**2 * residuals)[:, None]
@@ -219,12 +236,7 @@ def _finished(points: Array, noise_cov: Array, root: Array, centre: Array) -> El
     bread = (derivative * (slope / sigma**2)[:, None]).T @ derivative
     scale = 1 / np.sqrt(np.abs(np.diag(bread)))
     inverse = np.linalg.inv(bread * np.outer(scale, scale)) * np.outer(scale, scale)
-    length = max(1, len(points) // BLOCKS)
-    edges = np.arange(0, len(points), length)
-    blocks = np.add.reduceat(score, edges, axis=0)
-    parameters = derivative.shape[1]
-    factor = len(blocks) / max(1, len(blocks) - parameters)
-    cov = factor * inverse @ (blocks.T @ blocks) @ inverse
+    cov = inverse @ _score_cov(score) @ inverse
     _, along = excess((points - centre) @ root, root @ noise_cov @ root)
     return EllipsoidFit(
         root,

@@ -1,7 +1,7 @@
-"""Ferraris against imucal's file, and how even a calibrated magnetometer is: `python field_figures.py [--json]`.
+"""Ferraris against imucal's file; how even a calibrated magnetometer is: `python field_figures.py [--json]`.
 
 Needs FACTORLAB_DATA.  The spread is the standard deviation over the mean of the mean norms of 24 equal-area
-cells of direction (4 bands of elevation by 6 of azimuth), over raw samples, the mean excess by noise taken off.
+cells of direction (4 bands of elevation by 6 of azimuth), over raw samples, the mean excess by noise off.
 """
 
 from __future__ import annotations
@@ -42,6 +42,21 @@ def averaged(fit: MagnetometerFit, recording: ImuRecording, seconds: float) -> f
     return cell_means(fit.calibration.apply((total[width:] - total[:-width]) / width)).spread
 
 
+def wandering(fit: MagnetometerFit, recording: ImuRecording, seconds: float = 50.0) -> float:
+    """RMS over the axes of the hard iron's change from window to window, in fields, its noise taken off."""
+    norms, vectors = fit.check.norms, fit.check.vectors
+    towards = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    time = recording.seconds[fit.readings.rows]
+    excess = []
+    for start in np.arange(60.0, recording.duration - seconds, seconds):
+        rows = (time >= start) & (time < start + seconds)
+        design = np.column_stack([towards[rows], np.ones(rows.sum())])
+        shift = np.linalg.lstsq(design, norms[rows] - 1)[0][:3]
+        noise = fit.fit.sigma**2 * np.diag(np.linalg.inv(design.T @ design))[:3]
+        excess.append(shift**2 - noise)
+    return float(np.sqrt(max(0.0, np.mean(excess))))
+
+
 def magnetometer(path: Path) -> dict[str, Figure]:
     """The turns of the QMC5883L: judged on all, on the other half, with turned cells, with moving means."""
     say("QMC5883L: turns by hand")
@@ -58,7 +73,7 @@ def magnetometer(path: Path) -> dict[str, Figure]:
     other = [
         MagnetometerEllipsoid().calibrate(a).verify(b).calibrated.spread for a, b in (halves, halves[::-1])
     ]
-    plain = np.linalg.norm(check.vectors, axis=1)
+    plain, wander = np.linalg.norm(check.vectors, axis=1), wandering(fit, recording)
     noise = f"noise alone {100 * check.cell_noise:.2f}; raw {100 * check.raw.spread:.1f}"
     return {
         "qmc_spread": Figure(100 * check.calibrated.spread, "%", f"2.4 for 0.3 s means; {noise}", 2.0, 1.0),
@@ -76,6 +91,9 @@ def magnetometer(path: Path) -> dict[str, Figure]:
             100 * averaged(fit, recording, 0.3), "%", "0.3 s: the mean of a turning vector is shorter"
         ),
         "qmc_spread_mean_0.5s": Figure(100 * averaged(fit, recording, 0.5), "%", "0.5 s"),
+        "qmc_offset_wander": Figure(
+            100 * wander, "%", "hard iron of 50 s windows about its mean, noise off: limits the rows above"
+        ),
         "qmc_scatter_over_noise": Figure(
             fit.fit.sigma / fit.fit.expected, "x", "scatter of one norm over the sensor's noise", None, 1.1
         ),

@@ -133,6 +133,17 @@ def test_covariance_counts_neighbours_that_err_together(rng):
     np.testing.assert_allclose(np.diag(b.cov), np.diag(a.cov), rtol=0.5)
 
 
+def test_covariance_counts_a_field_that_wanders(rng):
+    """Hard iron that drifts by 1 % of the field over minutes: intervals grow, and still cover the mean."""
+    t = np.linspace(0, 1, 8000)
+    still = points(0, rng, directions=smooth_turns(len(t), rng), sigma=0.5)
+    wander = 0.6 * np.stack([np.sin(9 * t), np.cos(7 * t + 1), np.sin(8 * t + 2)], axis=1)
+    a, b = (fit_ellipsoid(p, 0.25 * np.eye(3), rng) for p in (still, still + wander))
+    assert (np.diag(b.cov)[6:] > 2 * np.diag(a.cov)[6:]).all()
+    off = b.centre - (CENTRE + wander.mean(axis=0))
+    assert (np.abs(off) < 4 * np.sqrt(np.diag(b.cov)[6:])).all()
+
+
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.3])
 def test_outliers_have_no_say(rng, share):
     clean = points(3000, rng, sigma=0.5)
@@ -184,6 +195,23 @@ def test_verification_uses_other_readings(rng):
 def test_noise_is_found_from_differences(rng):
     raw = points(0, rng, directions=smooth_turns(6000, rng), sigma=0.7)
     np.testing.assert_allclose(difference_noise(raw), 0.7, rtol=0.06)
+
+
+def test_noise_that_outliers_overrate_is_set_right(rng):
+    """A tenth of the readings are wild: a third of all differences is, and the median with them."""
+    raw = points(0, rng, directions=smooth_turns(3000, rng), sigma=0.1)
+    hit = rng.random(len(raw)) < 0.15
+    raw[hit] += 25 * rng.standard_normal((hit.sum(), 3))
+    assert difference_noise(raw).max() > 0.2
+    fit = MagnetometerEllipsoid().calibrate(recording(raw))
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.readings.noise_cov)), 0.1, rtol=0.35)
+    np.testing.assert_allclose(fit.calibration.offset, CENTRE, atol=0.05)
+
+
+def test_a_sensor_without_noise_is_calibrated_exactly(rng):
+    raw = points(0, rng, directions=smooth_turns(2000, rng), sigma=0.0)
+    fit = MagnetometerEllipsoid(field=1.0).calibrate(recording(raw))
+    np.testing.assert_allclose(fit.calibration.matrix, ROOT, atol=2e-6)
 
 
 def test_a_planar_turn_is_calibrated_in_its_plane_and_says_so(rng):
