@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from sequential.sensors import ImuRecording
 __all__ = ["Reference", "Solved", "reference_of", "solve_attitude"]
 
 Array = NDArray[np.float64]
+QUICK_S = 20.0
 CHI2_95 = 7.815  # χ² of 3 degrees of freedom, 95 %
 ANOTHER_NORTH = np.radians(20.0)
 LONGEST_NS = 100_000_000  # between two poses of a truth that a sample may lie between
@@ -68,15 +69,25 @@ def solve_attitude(
     found = []
     for name in names:
         estimator = make_estimator(name)
-        began = perf_counter()
-        history = estimator.estimate(recording)
-        spent = perf_counter() - began
+        history, spent = _timed(estimator, recording)
         error = nees = None
         if reference is not None:
             error = _error(history.world_q_body, reference, north=recording.mag is not None)
             nees = _nees(history, reference, error)
         found.append(Solved(name, history, spent, error, nees))
     return tuple(found)
+
+
+def _timed(estimator: Any, recording: ImuRecording) -> tuple[AttitudeHistory, float]:
+    """The answer and its seconds: of a second call, as the first one loads what is compiled."""
+    began = perf_counter()
+    history = estimator.estimate(recording)
+    spent = perf_counter() - began
+    if spent < QUICK_S:
+        began = perf_counter()
+        history = estimator.estimate(recording)
+        spent = perf_counter() - began
+    return history, spent
 
 
 def _error(world_q_body: Array, reference: Reference, *, north: bool) -> AttitudeError:
