@@ -177,7 +177,7 @@ def _label_axes(axes: Axes, panel: AllanPanel, lang: Language) -> None:
     head = None
     if panel.fits:
         units = ", ".join(f"{term} {_shown_unit(term, panel)}" for term in ("N", "B", "K"))
-        head = f"{units}   ({said['bound']})"
+        head = f"{units} ({said['bound']})"
     axes.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.11), title=head, title_fontsize=8.5, handlelength=3
     )
@@ -200,4 +200,4 @@ def _label(panel: AllanPanel, axis: int) -> str:
             said.append(f"{term} {panel.factor * one.value:#.3g}")
         elif term in {"N", "B", "K"}:
             said.append(f"{term} < {panel.factor * one.high:#.2g}")
-    return f"{name}:  " + "   ".join(said)
+    return f"{name}: " + ", ".join(said)
