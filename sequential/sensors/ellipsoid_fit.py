@@ -215,8 +215,8 @@ def _moved(root: Array, centre: Array, step: Array) -> Ellipsoid:
 def _score_cov(score: Array) -> Array:
     """Covariance (p, p) of the sum of the scores (N, p), from sums over blocks of neighbours.
 
-    A field that changes over minutes shows in blocks so long that few are left; they scatter too much to stand
-    for every parameter, and raise the whole covariance where they agree that it is too small.
+    A field that changes over minutes shows in blocks so long that few are left; they scatter too much to
+    stand for every parameter, and raise the whole covariance where they agree that it is too small.
     """
     short, long = (_block_cov(score, count) for count in (BLOCKS, LONG_BLOCKS))
     ratio = float(np.mean(np.diag(long) / np.maximum(np.diag(short), 1e-300)))
