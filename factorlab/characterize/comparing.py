@@ -9,7 +9,7 @@ from factorlab.characterize.words import say
 from factorlab.report.document import Status, Verdict
 from factorlab.report.words import Language
 
-__all__ = ["against_declared", "judged_density"]
+__all__ = ["NEAR", "against_declared", "judged_density", "rounded"]
 
 NEAR = 1.5  # a ratio of variances up to which R is right enough
 DENSITY_NEAR = 1.5
@@ -45,15 +45,15 @@ def _judged(
     """Words and status for a ratio of variances."""
     remedy = say(lang, "r_do", r=sigma**2, sigma=sigma, unit=unit)
     if ratio > NEAR and band[0] > 1.0:
-        words = say(lang, "r_small", x=_round(ratio, lang), axis=axis)
+        words = say(lang, "r_small", x=rounded(ratio, lang), axis=axis)
         return (words, remedy), "FAIL" if ratio > FAR else "WARN"
     if ratio < 1.0 / NEAR and band[1] < 1.0:
-        words = say(lang, "r_large", x=_round(1.0 / ratio, lang), axis=axis, nis=ratio)
+        words = say(lang, "r_large", x=rounded(1.0 / ratio, lang), axis=axis, nis=ratio)
         return (words, remedy), "WARN"
     return (say(lang, "r_fits", declared=declared, measured=sigma, unit=unit), ""), "PASS"
 
 
-def _round(times: float, lang: Language) -> str:
+def rounded(times: float, lang: Language) -> str:
     """A factor as people say it: 8.2, 15, 230."""
     text = f"{times:.2g}" if times < 10.0 else f"{times:.0f}"
     return text.replace(".", ",") if lang == "fr" else text
@@ -73,8 +73,8 @@ def judged_density(
     ratio = measured / declared if declared > 0.0 else float("inf")
     remedy = say(lang, "density_do", measured=measured, unit=unit)
     if ratio > DENSITY_NEAR:
-        words = say(lang, "density_small", x=_round(ratio, lang), **numbers)
+        words = say(lang, "density_small", x=rounded(ratio, lang), **numbers)
         return (words, remedy), "FAIL" if ratio > DENSITY_FAR else "WARN"
     if ratio < 1.0 / DENSITY_FAR:
-        return (say(lang, "density_large", x=_round(1.0 / ratio, lang), **numbers), ""), "INFO"
+        return (say(lang, "density_large", x=rounded(1.0 / ratio, lang), **numbers), ""), "INFO"
     return (say(lang, "density_fits", **numbers), ""), "PASS"

@@ -10,6 +10,7 @@ from factorlab.characterize.engine import Study
 from factorlab.characterize.findings import of_findings
 from factorlab.characterize.slow_verdicts import of_densities, of_slow_noise
 from factorlab.characterize.stepping import of_steps
+from factorlab.characterize.summary import in_short
 from factorlab.characterize.tables import sections_at_rest, sections_of_steps
 from factorlab.characterize.verdicts import at_rest
 from factorlab.characterize.words import say
@@ -31,6 +32,7 @@ def document_of(study: Study, *, lang: Language = "en", command: str = "") -> Do
     return Document(
         title=say(lang, "title", name=study.name),
         lead=_lead(study, lang),
+        conclusion=in_short(study, lang),
         verdicts=tuple(sorted(verdicts, key=lambda one: ORDER[one.verdict])),
         sections=tuple(sections),
         numbers=_numbers(study),

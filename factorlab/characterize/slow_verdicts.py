@@ -16,7 +16,7 @@ from sequential.noise import ImuNoise
 from sequential.sensors import NoiseFit
 from sequential.sensors.noise_words import coefficient_unit, span
 
-__all__ = ["of_densities", "of_slow_noise"]
+__all__ = ["best_time", "of_densities", "of_slow_noise", "written_span"]
 
 Fits = dict[str, NoiseFit]
 MISFIT = 2.0  # times the power of the fit that is worth a warning
@@ -62,8 +62,8 @@ def _slower(fits: Fits, term: Literal["B", "K"], lang: Language) -> Verdict:
             f"allan_{term.lower()}_unseen",
             most=fit[term].high,
             unit=unit,
-            duration=_span(fit.duration, lang),
-            needed=_span(fit.seconds_needed(term, 0.5 * fit[term].high), lang),
+            duration=written_span(fit.duration, lang),
+            needed=written_span(fit.seconds_needed(term, 0.5 * fit[term].high), lang),
         )
         return Verdict(say(lang, "allan_metric", term=term, axis=name), None, None, "INFO", meaning)
     name, fit = _largest(seen, lambda one: one[term].value)
@@ -71,8 +71,8 @@ def _slower(fits: Fits, term: Literal["B", "K"], lang: Language) -> Verdict:
     meaning = say(
         lang,
         f"allan_{term.lower()}_seen",
-        tau=_span(_best_time(fit), lang),
-        floor=float(fit.deviation([_best_time(fit)])[0]),
+        tau=written_span(best_time(fit), lang),
+        floor=float(fit.deviation([best_time(fit)])[0]),
         own=fit.unit,
         square=one.value**2,
     )
@@ -80,14 +80,15 @@ def _slower(fits: Fits, term: Literal["B", "K"], lang: Language) -> Verdict:
     return Verdict(metric, one.value, (one.low, one.high), "PASS", meaning, "", unit)
 
 
-def _best_time(fit: NoiseFit) -> float:
+def best_time(fit: NoiseFit) -> float:
     """Averaging time (s) from which the deviation of a fit is within a tenth of its least."""
     tau = np.geomspace(1.0 / fit.rate, fit.duration, 400)
     deviation = fit.deviation(tau)
     return float(tau[np.argmax(deviation < 1.1 * deviation.min())])
 
 
-def _span(seconds: float, lang: Language) -> str:
+def written_span(seconds: float, lang: Language) -> str:
+    """A length of time as one says it."""
     text = span(seconds)
     return text.replace(".", ",").replace("days", "jours") if lang == "fr" else text
 

@@ -103,6 +103,7 @@ class Document:
     numbers: Mapping[str, Any] = field(default_factory=dict)
     lang: Language = "en"
     command: str = ""  # as it can be typed again
+    conclusion: str = ""  # the verdict in one sentence: below the lead on the page, last in a terminal
 
     @property
     def failed(self) -> bool:
@@ -124,6 +125,7 @@ class Document:
             "schema": SCHEMA,
             "title": self.title,
             "lead": self.lead,
+            "conclusion": self.conclusion,
             "verdicts": [one.to_json() for one in self.verdicts],
         }
         last = {"versions": versions(), "command": self.command}

@@ -25,6 +25,9 @@ def document_lines(document: Document) -> Iterable[str]:
             yield ""
     for one in document.verdicts:
         yield from _verdict(one, document.lang)
+    if document.conclusion:
+        yield ""
+        yield from wrap(document.conclusion, WIDTH)
 
 
 def _verdict(one: Verdict, lang: Language) -> Iterable[str]:

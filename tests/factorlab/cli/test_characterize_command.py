@@ -93,6 +93,9 @@ def test_an_r_eight_times_too_small_is_called_so(log):
         assert one["value"] == pytest.approx(8.0, rel=0.15)
         times = re.match(r"your R is ([\d.]+)x too small", one["meaning"])
         assert float(times.group(1)) == pytest.approx(8.0, rel=0.15)
+    last = " ".join(run(log, "--sigma", f"gyro={sigma}").stdout.split())
+    assert re.search(r"In short: accelerometer σ .*bias up to 1\.1\d °/s; Allan N", last)
+    assert re.search(r"your R of g. is [78]\.?\d*x too small\.$", last)
     same = whole(log, "--r", f"gx={sigma**2}")["verdicts"]
     assert sum(one["metric"].startswith("declared R") for one in same) == 1
 

@@ -42,6 +42,7 @@ def made(lang="en", **changes):
             "numbers": {"axes": {"gx": {"sigma": 1.25e-3, "none": float("nan")}}},
             "lang": lang,
             "command": "factorlab characterize <log> & run",
+            "conclusion": "In short: <good>.",
         }
         | changes
     )
@@ -56,7 +57,12 @@ def test_the_page_stands_alone_and_is_well_formed(tmp_path):
     ET.fromstring(figures[0])  # noqa: S314 - made here, a moment ago
     assert "gyro &lt;left&gt; &amp; right" in html
     assert "factorlab characterize &lt;log&gt; &amp; run" in html
-    assert html.index("Verdict") < html.index("Axes") < html.index("<svg")
+    assert (
+        html.index("In short: &lt;good&gt;.")
+        < html.index("Verdict")
+        < html.index("Axes")
+        < html.index("<svg")
+    )
     assert html.count("<p>First.</p>") == html.count("<p>Second.</p>") == 1
     for status in ("PASS", "FAIL", "INFO"):
         assert f'class="badge {status}"' in html
@@ -109,3 +115,4 @@ def test_a_terminal_shows_tables_and_verdicts():
     assert "gy          –     7" in lines
     assert "PASS  σ of gx  0.00125  [0.00120 – 0.00130] rad/s" in lines
     assert "      -> take it off" in lines
+    assert lines[-1] == "In short: <good>.", "the verdict in one sentence is what is read last"
