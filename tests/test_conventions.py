@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from sequential.attitude import attitude_from_vectors, roll_pitch_yaw
 from sequential.history import Innovations
 from sequential.log import SensorLog, Stream, nanoseconds
 from sequential.manifold import SE2, SE3, SO2, SO3, NavState, Product, Vector, rotation_matrix
@@ -23,6 +24,14 @@ def test_quaternions_are_hamiltons_scalar_first(rng):
     rotation = Rotation.random(rng=rng)
     world_q_body = np.roll(rotation.as_quat(), 1)  # SciPy keeps the scalar last
     np.testing.assert_allclose(rotation_matrix(world_q_body), rotation.as_matrix(), atol=1e-15)
+
+
+def test_an_attitude_s_world_is_east_north_up():
+    """A level sensor whose x axis points north has a yaw of 90°."""
+    up, north_and_down = [0.0, 0.0, 9.81], [20.0, 0.0, -40.0]
+    world_q_body = attitude_from_vectors(np.array(up), np.array(north_and_down))
+    np.testing.assert_allclose(np.degrees(roll_pitch_yaw(world_q_body)), [0.0, 0.0, 90.0], atol=1e-12)
+    np.testing.assert_allclose(rotation_matrix(world_q_body) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15)
 
 
 @pytest.mark.parametrize(
