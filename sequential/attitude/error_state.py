@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ __all__ = ["ErrorStateAttitude"]
 
 Array = NDArray[np.float64]
 DEGREE = float(np.pi / 180.0)
+WIDTHS = {"world_q_body": 4, "heading_free": 4, "cov": 9, "cov_6d": 9, "gyro_bias": 3, "gyro_bias_cov": 9}
 GYRO_ERROR_TIME = 0.5  # s over which an error that grows with the rate keeps its sign
 MAY_BE_ZERO = {
     "bias_walk",
@@ -222,9 +223,19 @@ class ErrorStateAttitude(AttitudeFilter):
 
         gyro, accel, mag = self.samples(recording)
         n = len(recording)
-        world, free = np.empty((n, 4)), np.empty((n, 4))
-        cov, cov_free, bias_cov = np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3))
-        bias, rest, disturbed = np.empty((n, 3)), np.empty(n, np.bool_), np.empty(n, np.bool_)
-        results = (world, free, cov, cov_free, bias, bias_cov, rest, disturbed)
-        run_error_state(recording.t, gyro, accel, mag, self.settings, np.zeros(STATE), *results)
-        return AttitudeHistory(recording.t, *results, name=self.name)
+        # one block of memory, so that the system maps it in few pieces, and nothing is copied
+        numbers, flags = np.empty(n * sum(WIDTHS.values())), np.empty(2 * n, np.bool_)
+        columns = _columns(numbers, flags, n).values()
+        run_error_state(recording.t, gyro, accel, mag, self.settings, np.zeros(STATE), *columns)
+        numbers.flags.writeable = flags.flags.writeable = False
+        return AttitudeHistory(recording.t, **_columns(numbers, flags, n), name=self.name)
+
+
+def _columns(numbers: Array, flags: NDArray[np.bool_], n: int) -> dict[str, Any]:
+    """Fields of an attitude history, in the order of the compiled loop, as views of two blocks."""
+    columns, start = {}, 0
+    for name, width in WIDTHS.items():
+        part = numbers[start : start + n * width]
+        columns[name] = part.reshape((n, 3, 3) if width == 9 else (n, width))
+        start += n * width
+    return {**columns, "rest": flags[:n], "magnetic_disturbance": flags[n:]}
