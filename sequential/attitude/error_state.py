@@ -23,6 +23,7 @@ GYRO_ERROR_TIME = 0.5  # s over which an error that grows with the rate keeps it
 MAY_BE_ZERO = {
     "bias_walk",
     "iron_walk",
+    "iron_doubt",
     "reference_walk",
     "iron_sigma",
     "delay",
@@ -80,14 +81,16 @@ class ErrorStateAttitude(AttitudeFilter):
     rest_noise : rad/s/√Hz of the gyro's mean at rest, bias instability included
     field_noise : √s times the length of the field: slow disturbances indoors, not the sensor's noise; large:
         heading follows the gyro longer
-    field_gate : share of the field's length from which on an error is a disturbance
+    field_gate : share of the field's length by which strength and dip may err before the field is disturbed
     field_doubt : factor on the square of such an error in the noise; large: a disturbed field counts less
     bias_memory : s over which a bias that is still unknown turns the heading the same way
     iron_sigma, iron_walk : share of the field, and of it per √s: hard iron left by the calibration
+    iron_doubt : 1/s, by which the square of a disturbance makes the hard iron unsure: a magnet on the sensor
+        is learned; 0 lets only the walk change it
     reference_sigma, reference_walk : the same for the reference field
     delay, delay_sigma : s by which the field lags the gyro at the start; the filter learns it while turning
     latency, latency_sigma : s by which gyro readings lag their stamps (the low-pass of a MEMS gyro delays by
-        1 to 5 ms), made up for in what is reported, and how well that is known
+        2 to 5 ms), made up for in what is reported, and how well that is known
     tilt_floor : rad in the covariance of the inclination that no filter averages away (accelerometer bias)
     heading_floor : the same for the heading, as a share of the field that is hard or soft iron
     start_tilt_sigma, start_heading_sigma : rad
@@ -110,12 +113,12 @@ class ErrorStateAttitude(AttitudeFilter):
 
     block: float = 0.05
     gyro_noise: float = 0.01 * DEGREE
-    tilt_scale: float = 0.001
+    tilt_scale: float = 0.0008
     heading_scale: float = 0.004
     bias_walk: float = 0.0005 * DEGREE
     bias_sigma: float = 0.5 * DEGREE
     motion_bandwidth: float = 1.5
-    motion_spread: float = 1.5
+    motion_spread: float = 0.85
     motion_floor: float = 1e-4
     motion_time: float = 1.0
     velocity_sigma: float = 0.5
@@ -128,16 +131,17 @@ class ErrorStateAttitude(AttitudeFilter):
     rest_filter: float = 0.5
     rest_noise: float = 0.03 * DEGREE
     field_noise: float = 0.05
-    field_gate: float = 0.07
-    field_doubt: float = 5.0
+    field_gate: float = 0.06
+    field_doubt: float = 100.0
     bias_memory: float = 10.0
     iron_sigma: float = 0.005
     iron_walk: float = 0.0005
+    iron_doubt: float = 0.1
     reference_sigma: float = 0.1
     reference_walk: float = 0.0005
     delay: float = 0.01
     delay_sigma: float = 0.005
-    latency: float = 0.002
+    latency: float = 0.004
     latency_sigma: float = 0.001
     tilt_floor: float = 0.2 * DEGREE
     heading_floor: float = 0.02
@@ -176,7 +180,13 @@ class ErrorStateAttitude(AttitudeFilter):
         values += [self.rest_rate_change**2, self.rest_force_change**2, self.rest_time, self.rest_rate]
         values += [self.rest_filter, self.rest_noise**2]
         values += [self.field_noise**2, self.field_gate**2, self.field_doubt, 2.0 * self.bias_memory]
-        values += [self.iron_sigma**2, self.iron_walk**2, self.reference_walk**2, self.reference_sigma**2]
+        values += [
+            self.iron_sigma**2,
+            self.iron_walk**2,
+            self.iron_doubt,
+            self.reference_walk**2,
+            self.reference_sigma**2,
+        ]
         values += [self.delay, self.delay_sigma**2]
         values += [self.latency, self.latency_sigma**2, self.tilt_floor**2, self.heading_floor**2]
         values += [self.start_tilt_sigma**2, self.start_heading_sigma**2]

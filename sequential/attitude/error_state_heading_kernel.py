@@ -101,14 +101,21 @@ def correct_heading(s, p, mx, my, mz, wx, wy, wz, tilt):
     x, y, z = (c * mx - d * my) * unit, (d * mx + c * my) * unit, mz * unit
     u, v = c * wx - d * wy, d * wx + c * wy
     sx, sy, sz = v * z - wz * y, wz * x - u * z, u * y - v * x
-    beyond = -p[at.FIELD_GATE] - tilt
-    for axis in range(3):
-        m, slide = (x, sx) if axis == 0 else ((y, sy) if axis == 1 else (z, sz))
-        innovation = look(s, axis, m, slide, c, d)
-        beyond += innovation * innovation - expected(s, axis)
+    # judged by strength and dip alone: a wrong heading must not make the field look disturbed
+    r, iron, inverse = at.TURNED, at.IRON, 1.0 / s[at.SAMPLES]
+    e0 = mx * unit - (s[r] * s[iron] + s[r + 1] * s[iron + 1] + s[r + 2] * s[iron + 2]) * inverse
+    e1 = my * unit - (s[r + 3] * s[iron] + s[r + 4] * s[iron + 1] + s[r + 5] * s[iron + 2]) * inverse
+    e2 = z - (s[r + 6] * s[iron] + s[r + 7] * s[iron + 1] + s[r + 8] * s[iron + 2]) * inverse
+    e0 -= s[at.DELAY] * (c * sx + d * sy)
+    e1 -= s[at.DELAY] * (c * sy - d * sx)
+    across, up = math.sqrt(e0 * e0 + e1 * e1) - s[at.NORTH], e2 - s[at.DELAY] * sz - s[at.UP]
+    known = s[D + M + 1] + s[D + 2 * (M + 1)]
+    beyond = across * across + up * up - known - tilt - p[at.FIELD_GATE]
     s[at.DISTURBED] = 1.0 if beyond > 0.0 else 0.0
     noise = p[at.FIELD_NOISE] / min(max(s[at.UNSEEN], p[at.BLOCK]), LONGEST) + 0.5 * tilt
     noise += p[at.FIELD_DOUBT] * max(0.0, beyond)
+    for i in range(3, 6):
+        s[D + (M + 1) * i] += p[at.IRON_DOUBT] * max(0.0, beyond) * min(s[at.UNSEEN], LONGEST)
     for axis in range(3):
         m, slide = (x, sx) if axis == 0 else ((y, sy) if axis == 1 else (z, sz))
         innovation = look(s, axis, m, slide, c, d)

@@ -50,7 +50,8 @@ GAIN = 240  # 10
 ROW = 250  # 7
 MEAN_FORCE = 257  # 3, low-passed specific force in the frame of the gyro
 AGE = 260  # s since the start or the last gap
-STATE = 261
+LAST_RATE = 261  # 3, the reading before
+STATE = 264
 
 # settings
 (
@@ -80,6 +81,7 @@ STATE = 261
     BIAS_MEMORY,
     IRON_PRIOR,
     IRON_WALK,
+    IRON_DOUBT,
     REFERENCE_WALK,
     REFERENCE_PRIOR,
     DELAY_MEAN,
@@ -93,4 +95,4 @@ STATE = 261
     TILT_KNOWN,
     LEVEL_PRIOR,
     SETTINGS,
-) = range(39)
+) = range(40)

@@ -170,7 +170,11 @@ def close_block(s, p):
 def gather(s, w, a, m, dt):
     """Turn by one sample and add its force and field, in the frame of the gyro, to the sums."""
     x, y, z = w[0] - s[at.BIAS], w[1] - s[at.BIAS + 1], w[2] - s[at.BIAS + 2]
-    turn(s, x * dt, y * dt, z * dt, THIRD)
+    # half way between two readings: the rate of sampling does not shift the attitude in time
+    h, b = 0.5 * dt, at.LAST_RATE
+    u, v, t = s[b] - s[at.BIAS], s[b + 1] - s[at.BIAS + 1], s[b + 2] - s[at.BIAS + 2]
+    turn(s, h * (x + u), h * (y + v), h * (z + t), THIRD)
+    s[b], s[b + 1], s[b + 2] = w[0], w[1], w[2]
     s[at.RATE_SQUARED] += x * x + y * y + z * z
     q, i, j, k = s[0], s[1], s[2], s[3]
     r0, r1, r2 = 1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j - q * k), 2.0 * (i * k + q * j)

@@ -38,6 +38,15 @@ def absorb(s, p, n, x, innovation, variance):
             s[p + n * j + i] = value
 
 
+@njit(types.void(w1, f0, f0), **compiled)
+def absorb_tilt(s, innovation, variance):
+    """`absorb` for inclination and bias; the drift of the heading is considered, not corrected (Schmidt)."""
+    heading = s[P + 2 * (N + 1)]
+    absorb(s, P, N, X, innovation, variance)
+    s[P + 2 * (N + 1)] = heading
+    s[X + 2] = 0.0
+
+
 @njit(types.void(w1, f0, f0, f0), **compiled)
 def propagate_tilt(s, dt, fz, inverse):
     """P ← F P Fᵀ over a block: θ' = -R b, v' = fz (θy, -θx), p' = v; `inverse` is 1 / samples."""
@@ -88,7 +97,7 @@ def correct_tilt(s, p, dt, fx, fy):
         known = sign * s[G + tilt] + 2.0 * alpha * s[G + 6 + i] + square * s[G + 8 + i]
         noise = p[at.SPREAD] * s[at.LEVEL] / dt
         squared = innovation * innovation
-        absorb(s, P, N, X, innovation, known + noise)
+        absorb_tilt(s, innovation, known + noise)
         s[at.LEVEL] += share * (squared * dt - s[at.LEVEL])
         s[at.LEVEL] = max(s[at.LEVEL], p[at.LEVEL_FLOOR])
 
@@ -101,18 +110,18 @@ def rest_bias(s, p, dt, inverse):
         for j in range(N):
             s[G + j] = s[P + N * j + k]
         innovation = s[at.RATE + i] * inverse - s[at.BIAS + i] - s[X + k]
-        absorb(s, P, N, X, innovation, s[G + k] + p[at.REST_NOISE] / dt)
+        absorb_tilt(s, innovation, s[G + k] + p[at.REST_NOISE] / dt)
 
 
 @njit(types.void(w1), **compiled)
 def inject_tilt(s):
-    """Put the errors found into the nominal values; the world's heading is kept by DELTA."""
-    x, y, z = 0.5 * s[X], 0.5 * s[X + 1], 0.5 * s[X + 2]
+    """Put the errors found into the nominal values."""
+    x, y = 0.5 * s[X], 0.5 * s[X + 1]
     a, b, c, d = s[0], s[1], s[2], s[3]
-    w = a - x * b - y * c - z * d
-    i = b + x * a + y * d - z * c
-    j = c - x * d + y * a + z * b
-    k = d + x * c - y * b + z * a
+    w = a - x * b - y * c
+    i = b + x * a + y * d
+    j = c - x * d + y * a
+    k = d + x * c - y * b
     scale = 1.0 / math.sqrt(w * w + i * i + j * j + k * k)
     s[0], s[1], s[2], s[3] = w * scale, i * scale, j * scale, k * scale
     s[at.DELTA] -= 0.0 * s[X + 2]
