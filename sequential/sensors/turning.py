@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 CALM = 0.05  # spread of the quietest part over its level, up to which it counts as rest
 FEWEST, WINDOWS = 30, 300  # half seconds from which scales can be told apart, and as many as are used
 CLEAR = 0.75  # of the error without turning, below which a factor explains what is seen
-FAIR, LOST = 0.6, 1.4  # rad: a mean angle above the first explains nothing, above the second says nothing
+FAIR = 0.6  # rad: a mean angle above this explains nothing
 
 
 def level_at_rest(values: Array, rate: float) -> float:
@@ -84,7 +84,7 @@ def turning_errors(gyro: Array, t: NDArray[np.int64], accel: Array, factors: Arr
 
 def right_factor(errors: Array | None) -> int | None:
     """Index of the factor that turns gravity clearly better than the others and than none, or None."""
-    if errors is None or errors[-1] > LOST:
+    if errors is None:
         return None
     best = int(np.argmin(errors[:-1]))
     others = np.delete(errors[:-1], best)

@@ -17,26 +17,24 @@ from sequential.readers.npz import read_arrays
 __all__ = ["found_out", "holds_imu"]
 
 WIDE = re.compile(r"[A-Za-z_]\w*[.@][A-Za-z_]\w*")  # a column of a log of streams, such as gps.x
+BY_ENDING = {
+    ".npz": "npz",
+    ".ulg": "ulog",
+    ".mat": "broad",
+    ".h5": "broad",
+    ".hdf5": "broad",
+    ".json": "sensor_logger",
+}
 
 
 def found_out(place: Path) -> str:
     """The kind of a file by its name, and of a folder by what is in it."""
-    if place.is_dir():
-        return _export_kind(open_export(place), place)
     ending = place.suffix.lower()
-    by_ending = {
-        ".zip": "zip",
-        ".npz": "npz",
-        ".ulg": "ulog",
-        ".h5": "broad",
-        ".hdf5": "broad",
-        ".json": "sensor_logger",
-    }
-    if ending in by_ending:
-        return _export_kind(open_export(place), place) if ending == ".zip" else by_ending[ending]
-    if is_imu_tk_text(place):
+    if place.is_dir() or ending == ".zip":
+        return _export_kind(open_export(place), place)
+    if is_imu_tk_text(place):  # whatever it is called: IMU-TK's own are named .mat
         return "imu_tk"
-    return "broad" if ending == ".mat" else "csv"
+    return BY_ENDING.get(ending, "csv")
 
 
 def holds_imu(path: str | os.PathLike[str]) -> bool:
