@@ -51,6 +51,7 @@ def delivery_options(command: Command) -> Command:
               help="Noise of a reading, raw unit.  [default: from differences of neighbours]")  # fmt: skip
 @click.option("--planar/--space", default=None,
               help="Turns about one axis only, or in all directions.  [default: as it looks]")  # fmt: skip
+@click.option("--sphere", is_flag=True, help="Hard iron alone, gains equal: for few directions.")
 @click.option("--align", type=click.Choice(("gyro", "accel")),
               help="Find the rotation to the frame of this sensor, from the same recording.")  # fmt: skip
 @delivery_options
@@ -66,7 +67,7 @@ def mag(source: str, **options: Any) -> int:
 
     _require_free(options)
     recording = _recording(source, options)
-    settings = MagnetometerEllipsoid(options["field"], options["noise"], options["planar"])
+    settings = MagnetometerEllipsoid(options["field"], options["noise"], options["planar"], options["sphere"])
     fit = settings.calibrate(recording)
     alignment = None
     if options["align"] is not None:

@@ -24,7 +24,7 @@ RADIUS_KNOWN = 0.03  # relative standard deviation of a radius that is observed
 SEEN = 2.5  # spread along the thinnest direction over the noise of a reading
 PLANAR_SECTORS, RIM = 8, 0.1  # of 12; scatter of the radius that is still a rim and no disc
 EXACT = 1e-6  # scatter of a norm without any noise
-NOISE_ROUNDS, NOISE_FITS = 3, 0.9  # fits; scatter over noise under which the noise was overrated
+NOISE_ROUNDS, NOISE_FITS = 2, 0.9  # more fits; scatter over noise under which the noise was overrated
 UNMEASURED = 0.3  # relative, of a gain that a planar turn says nothing about
 
 
@@ -114,11 +114,13 @@ class MagnetometerEllipsoid:
     noise : standard deviation of a reading in the raw unit; None: from third differences of the recording
     planar : True for a robot that only turns on the floor, False for turns in space; None: the readings
         decide
+    sphere : take all gains to be equal and find the hard iron alone, where directions are too few for more
     """
 
     field: float | None = None
     noise: float | None = None
     planar: bool | None = None
+    sphere: bool = False
 
     def __post_init__(self) -> None:
         for name in ("field", "noise"):
@@ -136,13 +138,14 @@ class MagnetometerEllipsoid:
         """
         readings = readings_of(recording, self.noise)
         rng = np.random.default_rng(0) if rng is None else rng
-        for _ in range(NOISE_ROUNDS if self.noise is None else 1):
-            fit, basis = self._fitted(recording, readings, rng)
+        fit, basis = self._fitted(recording, readings, rng)
+        for _ in range(NOISE_ROUNDS if self.noise is None else 0):
             ratio = fit.sigma / max(fit.expected, 1e-12)
             if ratio > NOISE_FITS or fit.sigma < EXACT:
                 break
             # outliers and quick turns look like noise in differences: no norm scatters less than its noise
             readings = replace(readings, noise_cov=readings.noise_cov * ratio**2)
+            fit, basis = self._fitted(recording, readings, rng)
         return self._finished(recording, readings, fit, basis)
 
     def _fitted(
@@ -152,10 +155,11 @@ class MagnetometerEllipsoid:
         plane, thickness = _plane(readings)
         fit, basis = None, np.eye(3)
         if self.planar is not True and thickness > FLAT and _above_noise(readings):
-            fit = fit_ellipsoid(readings.points, readings.noise_cov, rng)
+            fit = fit_ellipsoid(readings.points, readings.noise_cov, rng, sphere=self.sphere)
         if self.planar is not False and not _observed(fit) and (thickness < NEARLY_FLAT or self.planar):
             basis = plane[:2].T
-            fit = fit_ellipsoid(readings.points @ basis, basis.T @ readings.noise_cov @ basis, rng)
+            flat_noise = basis.T @ readings.noise_cov @ basis
+            fit = fit_ellipsoid(readings.points @ basis, flat_noise, rng, sphere=self.sphere)
             fit = fit if fit is not None and _goes_round(readings.points @ basis, fit) else None
         if fit is None or not _observed(fit):
             raise UnderConstrainedError(weakest(readings.points, fit, basis, recording.name))
@@ -176,7 +180,7 @@ class MagnetometerEllipsoid:
         )
         check = check_field(calibration, field, readings, normal)
         radii, sigmas = _radii(fit)
-        doubts = doubts_of(readings.points, fit, radii, check.calibrated, normal, recording)
+        doubts = doubts_of(fit, radii, check.calibrated, normal, recording, sphere=self.sphere)
         return MagnetometerFit(
             calibration,
             field,

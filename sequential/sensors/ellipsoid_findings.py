@@ -39,19 +39,24 @@ def weakest(points: Array, fit: EllipsoidFit | None, basis: Array, name: str) ->
     return (
         f"the readings of recording {name!r} leave the ellipsoid free along {_direction(vector)}: they cover "
         "too few directions; point every axis up, down and to each side, and turn once about each"
+        "; or find the hard iron alone (sphere)"
     )
 
 
 def doubts_of(
-    points: Array,
     fit: EllipsoidFit,
     radii: Array,
     cells: CellMeans,
     normal: Array | None,
     recording: ImuRecording,
+    *,
+    sphere: bool,
 ) -> list[Finding]:
     """Everything that a reader of the constants should know."""
     found = [_frame(normal), *_coverage(cells, normal)]
+    if sphere:
+        what = "hard iron alone: all gains are taken to be equal, and axes square"
+        found.append(Finding("note", what, "", "turn in every direction to find soft iron too"))
     share = float((fit.weights == 0).mean())
     if share > 0:
         found.append(

@@ -10,6 +10,7 @@ readings, so that neighbours may be correlated.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -17,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import NotConvergedError
-from sequential.sensors.ellipsoid_moments import Ellipsoid, ellipsoid_from_moments
+from sequential.sensors.ellipsoid_moments import Ellipsoid, ellipsoid_from_moments, sphere_from_moments
 
 __all__ = ["EllipsoidFit", "excess", "fit_ellipsoid", "parameters_of", "symmetric_index"]
 
 Array = NDArray[np.float64]
+Through = Callable[[Array, Array], Ellipsoid | None]
 BIWEIGHT = 4.685  # 95 % efficient where there is no outlier
 TO_SIGMA = 1.482602218505602  # of a median absolute deviation
 STEPS, FULL_STEPS = 60, 15
@@ -75,36 +77,41 @@ def excess(vectors: Array, noise_cov: Array) -> tuple[Array, Array]:
     return (np.trace(noise_cov) - along) / (2 * norm), along
 
 
-def fit_ellipsoid(points: Array, noise_cov: Array, rng: np.random.Generator) -> EllipsoidFit | None:
+def fit_ellipsoid(
+    points: Array, noise_cov: Array, rng: np.random.Generator, *, sphere: bool = False
+) -> EllipsoidFit | None:
     """Robust fit to points (N, d); None where no ellipsoid goes through them.
 
     Parameters
     ----------
     noise_cov : (d, d) of a single reading
     rng : draws the subsets among which a start without outliers is looked for
+    sphere : one radius in all directions: the centre alone is looked for
 
     Raises
     ------
     NotConvergedError
     """
-    start = _start(points, noise_cov, rng)
+    through = sphere_from_moments if sphere else ellipsoid_from_moments
+    start = _start(points, noise_cov, rng, through)
     if start is None:
         return None
     root, centre = start
     step = scale = np.ones(1)
+    free = _free(len(centre), sphere=sphere)
     for k in range(STEPS):
         try:
-            step, scale = _step(points, noise_cov, root, centre)
+            step, scale = _step(points, noise_cov, root, centre, free)
         except np.linalg.LinAlgError:
             return None
-        root, centre = _moved(root, centre, step if k < FULL_STEPS else step / 2)
+        root, centre = _moved(root, centre, free @ (step if k < FULL_STEPS else step / 2))
         if np.linalg.eigvalsh(root)[0] <= 0:
             return None
-        if (np.abs(step) < np.maximum(SETTLED * scale, EXACT * _reach(root))).all():
-            return _finished(points, noise_cov, root, centre)
+        if (np.abs(step) < np.maximum(SETTLED * scale, EXACT * _reach(root, free))).all():
+            return _finished(points, noise_cov, root, centre, free)
     if np.abs(step / scale).max() < NEARLY:
-        return _finished(points, noise_cov, root, centre)
-    if (scale / _reach(root)).max() > LOOSE:
+        return _finished(points, noise_cov, root, centre, free)
+    if (scale / _reach(root, free)).max() > LOOSE:
         return None
     raise NotConvergedError(
         f"the ellipsoid had not settled after {STEPS} steps: readings of several fields are mixed; record "
@@ -112,19 +119,19 @@ def fit_ellipsoid(points: Array, noise_cov: Array, rng: np.random.Generator) -> 
     )
 
 
-def _start(points: Array, noise_cov: Array, rng: np.random.Generator) -> Ellipsoid | None:
+def _start(points: Array, noise_cov: Array, rng: np.random.Generator, through: Through) -> Ellipsoid | None:
     """From the moments of all points, unless most points are nearer to the ellipsoid of a small subset."""
     count = len(points)
     some = points[:: max(1, count // 2000)]
-    found = ellipsoid_from_moments(points, noise_cov)
+    found = through(points, noise_cov)
     best = np.inf if found is None else _middle_distance(some, found)
     if count < 2 * SUBSET or best < NEAR * float(np.sqrt(np.linalg.eigvalsh(noise_cov)[0])):
         return found
     for _ in range(SUBSETS):
-        candidate = ellipsoid_from_moments(points[rng.choice(count, SUBSET, replace=False)], noise_cov)
+        candidate = through(points[rng.choice(count, SUBSET, replace=False)], noise_cov)
         if candidate is not None and (distance := _middle_distance(some, candidate)) < best:
             best, found = distance, candidate
-    return None if found is None else _concentrated(points, noise_cov, found)
+    return None if found is None else _concentrated(points, noise_cov, found, through)
 
 
 def _distances(points: Array, ellipsoid: Ellipsoid) -> Array:
@@ -139,12 +146,12 @@ def _middle_distance(points: Array, ellipsoid: Ellipsoid) -> float:
     return float(np.median(_distances(points, ellipsoid)))
 
 
-def _concentrated(points: Array, noise_cov: Array, found: Ellipsoid) -> Ellipsoid:
+def _concentrated(points: Array, noise_cov: Array, found: Ellipsoid, through: Through) -> Ellipsoid:
     """From the moments of the points that are near, twice (the concentration step of Rousseeuw)."""
     for _ in range(2):
         distances = _distances(points, found)
         near = points[distances <= 3 * TO_SIGMA * np.median(distances)]
-        better = ellipsoid_from_moments(near, noise_cov)
+        better = through(near, noise_cov)
         if better is None or _middle_distance(points, better) > 1.2 * np.median(distances):
             break
         found = better
@@ -182,23 +189,35 @@ def _derivative(arm: Array, root: Array) -> Array:
     return np.column_stack([*columns, -unit @ root])
 
 
-def _step(points: Array, noise_cov: Array, root: Array, centre: Array) -> tuple[Array, Array]:
+def _step(points: Array, noise_cov: Array, root: Array, centre: Array, free: Array) -> tuple[Array, Array]:
     """Gauss-Newton step (p,) and the standard deviation of each parameter."""
     residuals, derivative, biweight, sigma = _weighed(points, noise_cov, root, centre)
+    derivative = derivative @ free
     weighed = derivative * (biweight / sigma**2)[:, None]
     information = weighed.T @ derivative
     scale = 1 / np.sqrt(np.diag(information))
     scaled = information * np.outer(scale, scale)
     step = -scale * np.linalg.solve(scaled, scale * (weighed.T @ residuals))
-    step = np.clip(step, -0.5 * _reach(root), 0.5 * _reach(root))
+    step = np.clip(step, -0.5 * _reach(root, free), 0.5 * _reach(root, free))
     return step, np.asarray(scale)
 
 
-def _reach(root: Array) -> Array:
-    """(p,) sizes that a step should not exceed: of the gains, and of the radius."""
+def _free(dim: int, *, sphere: bool) -> Array:
+    """(p, q) parameters by those that are fitted: all of them, or one gain and the centre."""
+    gains = dim * (dim + 1) // 2
+    if not sphere:
+        return np.eye(gains + dim)
+    free = np.zeros((gains + dim, 1 + dim))
+    free[:dim, 0], free[gains:, 1:] = 1.0, np.eye(dim)
+    return free
+
+
+def _reach(root: Array, free: Array) -> Array:
+    """(q,) sizes that a step should not exceed: of the gains, and of the radius."""
     dim = len(root)
     gain = np.trace(root) / dim
-    return np.concatenate([np.full(dim * (dim + 1) // 2, gain), np.full(dim, 1 / gain)])
+    reach = np.concatenate([np.full(dim * (dim + 1) // 2, gain), np.full(dim, 1 / gain)])
+    return np.asarray((free * reach[:, None]).max(axis=0))
 
 
 def _moved(root: Array, centre: Array, step: Array) -> Ellipsoid:
@@ -228,15 +247,16 @@ def _block_cov(score: Array, count: int) -> Array:
     return np.asarray(len(sums) / max(1, len(sums) - 1) * sums.T @ sums)
 
 
-def _finished(points: Array, noise_cov: Array, root: Array, centre: Array) -> EllipsoidFit:
+def _finished(points: Array, noise_cov: Array, root: Array, centre: Array, free: Array) -> EllipsoidFit:
     residuals, derivative, biweight, sigma = _weighed(points, noise_cov, root, centre)
+    derivative = derivative @ free
     score = derivative * (biweight / sigma**2 * residuals)[:, None]
     ratio2 = (residuals / (BIWEIGHT * sigma)) ** 2
     slope = np.where(ratio2 < 1, (1 - ratio2) * (1 - 5 * ratio2), 0.0)  # derivative of the biweight's score
     bread = (derivative * (slope / sigma**2)[:, None]).T @ derivative
     scale = 1 / np.sqrt(np.abs(np.diag(bread)))
     inverse = np.linalg.inv(bread * np.outer(scale, scale)) * np.outer(scale, scale)
-    cov = inverse @ _score_cov(score) @ inverse
+    cov = free @ inverse @ _score_cov(score) @ inverse @ free.T
     _, along = excess((points - centre) @ root, root @ noise_cov @ root)
     return EllipsoidFit(
         root,

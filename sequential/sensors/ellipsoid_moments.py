@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Ellipsoid", "ellipsoid_from_moments", "symmetric_root"]
+__all__ = ["Ellipsoid", "ellipsoid_from_moments", "sphere_from_moments", "symmetric_root"]
 
 Array = NDArray[np.float64]
 Ellipsoid = tuple[Array, Array]  # symmetric A (d, d) and centre b (d,) with |A (m - b)| = 1
@@ -114,6 +114,25 @@ def _of_quadric(quadric: Array, exponents: list[tuple[int, ...]], dim: int) -> E
     centre = -np.linalg.solve(Q, g) / 2
     level = centre @ Q @ centre - k
     return (symmetric_root(Q / level), centre) if level > 0 else None
+
+
+def sphere_from_moments(points: Array, noise_cov: Array) -> Ellipsoid | None:
+    """The same for one radius in all directions: |m|² is linear in centre and radius."""
+    middle = points.mean(axis=0)
+    x = points - middle
+    square = (x**2).sum(axis=1)
+    normal = np.block(
+        [[x.T @ x / len(x) - noise_cov, np.zeros((len(middle), 1))], [np.zeros(len(middle)), 1.0]]
+    )
+    # x is centred, so that what noise adds to the mean of |x|² x vanishes
+    right = np.append(square @ x / len(x), square.mean() - np.trace(noise_cov))
+    try:
+        *twice, level = np.linalg.solve(normal, right)
+    except np.linalg.LinAlgError:
+        return None
+    centre = np.array(twice) / 2
+    radius2 = level + centre @ centre
+    return (np.eye(len(centre)) / np.sqrt(radius2), middle + centre) if radius2 > 0 else None
 
 
 def symmetric_root(matrix: Array) -> Array:

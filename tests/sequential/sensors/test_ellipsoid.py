@@ -9,7 +9,7 @@ from sequential.sensors.ellipsoid_fit import (
     fit_ellipsoid,
     parameters_of,
 )
-from sequential.sensors.ellipsoid_moments import ellipsoid_from_moments, symmetric_root
+from sequential.sensors.ellipsoid_moments import ellipsoid_from_moments, sphere_from_moments, symmetric_root
 
 
 def test_excess_is_what_noise_adds_to_a_norm(rng):
@@ -59,6 +59,25 @@ def test_moments_and_the_constraint_of_li_and_griffiths_give_an_ellipsoid_of_a_t
         if found is not None:
             assert (np.linalg.eigvalsh(found[0]) > 0).all()
     assert False in kinds
+
+
+def test_a_sphere_through_exact_points(rng):
+    exact = 46.0 * sphere(50, rng) + CENTRE
+    root, centre = sphere_from_moments(exact, np.zeros((3, 3)))
+    np.testing.assert_allclose(root, np.eye(3) / 46.0, atol=1e-12)
+    np.testing.assert_allclose(centre, CENTRE, atol=1e-10)
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_noise_leaves_a_sphere_where_it_is(rng, even):
+    directions = sphere(60_000, rng)
+    directions = directions if even else directions[directions[:, 1] > 0]
+    noise = np.diag([1.0, 3.0, 2.0]) ** 2
+    noisy = 46.0 * directions + CENTRE + rng.standard_normal(directions.shape) * np.sqrt(np.diag(noise))
+    for found in (sphere_from_moments(noisy, noise), fit_ellipsoid(noisy, noise, rng, sphere=True)):
+        root, centre = found if isinstance(found, tuple) else (found.root, found.centre)
+        np.testing.assert_allclose(1 / root[0, 0], 46.0, atol=0.12)
+        np.testing.assert_allclose(centre, CENTRE, atol=0.15)
 
 
 # --- consistency: noise must not shrink or swell the ellipsoid ---

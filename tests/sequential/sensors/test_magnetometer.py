@@ -82,6 +82,18 @@ def test_too_few_directions_are_named(rng, directions, axis):
         MagnetometerEllipsoid(noise=3.0).calibrate(recording(raw))
 
 
+def test_hard_iron_alone_is_found_from_few_directions(rng):
+    cap = sphere(4000, rng)
+    cap = cap[(cap[:, 2] > 0.2) & (cap[:, 0] > -0.5)]
+    raw = points(0, rng, directions=cap, sigma=0.3, root=np.eye(3) / 46)
+    fit = MagnetometerEllipsoid(sphere=True, noise=0.3).calibrate(recording(raw))
+    np.testing.assert_allclose(fit.calibration.matrix, np.eye(3), atol=1e-9)
+    error = fit.calibration.offset - CENTRE
+    assert np.abs(error).max() < 0.5
+    assert (np.abs(error) < 4.5 * fit.calibration.sigmas()[1]).all()
+    assert any("hard iron alone" in f.what for f in fit.findings)
+
+
 def test_half_a_planar_turn_is_too_little(rng):
     half = smooth_turns(3000, rng, planar=True)
     raw = points(0, rng, directions=half[half[:, 1] > 0.2])
