@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from factorlab.characterize.channels import AXES
 from factorlab.characterize.comparing import against_declared
 from factorlab.characterize.engine import Study
 from factorlab.characterize.findings import of_findings
@@ -54,7 +55,9 @@ def _lead(study: Study, lang: Language) -> str:
         return say(lang, "lead_step", n=n)
     rate = study.axes[0].timing.rate
     if study.window is None:
-        return say(lang, "lead_whole", n=n, rate=rate, duration=study.duration)
+        # of an IMU the detector has said so, of a column the user
+        key = "lead_rest" if set(study.groups()) <= set(AXES) else "lead_whole"
+        return say(lang, key, n=n, rate=rate, duration=study.duration)
     start, stop = study.window[0], min(study.window[1], study.duration)
     return say(lang, "lead_part", n=n, rate=rate, start=start, stop=stop, duration=stop - start)
 

@@ -222,3 +222,17 @@ def test_a_real_mpu6050(data_dir):
     accelerometer = characterize(np.arange(len(raw)) * 10_000_000, raw[:, 0])
     assert accelerometer.resolution.lsb == 4.0, "its two last bits never change"
     np.testing.assert_allclose(accelerometer.oversampling.bits[:4], [0, 1, 2, 3], atol=0.1)
+
+
+def test_another_real_recording_of_the_same_sensor(data_dir):
+    """A hundred seconds instead of seven and a half minutes: the same noise, a bias that has moved."""
+    long, short = (
+        np.loadtxt(data_dir / f"imu/mpu6050/{name}.csv", delimiter=",", skiprows=5)
+        for name in ("example_data_tinit_calc", "imu_static_test")
+    )
+    for k in range(3, 6):
+        one, other = (characterize(np.arange(len(x)) * 10_000_000, x[:, k]) for x in (long, short))
+        assert other.noise.sigma.value == pytest.approx(one.noise.sigma.value, rel=0.03)
+        assert np.diff(other.noise.sigma[1:]) > 1.5 * np.diff(one.noise.sigma[1:]), "less is known from less"
+        assert other.noise.white
+        assert other.timing.computed
