@@ -47,21 +47,21 @@ def before_field(score, info, row, gain, wanted, work):
     push = gain[SIZE]
     for j in range(SIZE):
         push -= gain[j] * score[j]
-    for a in range(4):
-        score[1 + a if a < 2 else EAST + a - 2] += row[1 + a] * push
+    for a in range(5):
+        score[a if a < 3 else EAST + a - 3] += row[a] * push
     if not wanted:
         return
     inner = weigh(info, gain, work)
-    for a in range(4):
-        i = 1 + a if a < 2 else EAST + a - 2
+    for a in range(5):
+        i = a if a < 3 else EAST + a - 3
         for j in range(SIZE):
-            info[i, j] -= row[1 + a] * work[j]
+            info[i, j] -= row[a] * work[j]
         for j in range(SIZE):
-            info[j, i] -= row[1 + a] * work[j]
-    for a in range(4):
-        i = 1 + a if a < 2 else EAST + a - 2
-        for b in range(4):
-            info[i, 1 + b if b < 2 else EAST + b - 2] += row[1 + a] * row[1 + b] * inner
+            info[j, i] -= row[a] * work[j]
+    for a in range(5):
+        i = a if a < 3 else EAST + a - 3
+        for b in range(5):
+            info[i, b if b < 3 else EAST + b - 3] += row[a] * row[b] * inner
 
 
 @njit(types.void(w1, w2, types.int64, f1, types.boolean, w1), **compiled)

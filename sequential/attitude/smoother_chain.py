@@ -53,6 +53,7 @@ class AttitudeChain:
     rest : (K,)
     bias : (3,) guess of the gyro's bias, to begin with
     start : (3, 3) rotation, to begin with
+    fresh : (K, 3, 3) rotation after nodes that end a long gap; NaN elsewhere
     field : whether there is a magnetometer
     """
 
@@ -64,6 +65,7 @@ class AttitudeChain:
     rest: Flags
     bias: Array
     start: Array
+    fresh: Array
     field: bool
 
     @property
@@ -109,7 +111,7 @@ class AttitudeChain:
         given = np.ones(count) if weight is None else np.ascontiguousarray(weight)
         settings, start_cov = self.settings, self.model.prior(heading=field)
         forward(
-            self.nodes, self.rest, given, settings, start, prior, start_cov, field,
+            self.nodes, self.rest, given, self.fresh, settings, start, prior, start_cov, field,
             around is not None, rotation, state, deviation, cov, gains, by_gyro, by_push, rows, trust,
         )  # fmt: skip
         smoothed, end = np.zeros((count + 1, 6, 6)), np.zeros((SIZE, SIZE))
@@ -144,11 +146,11 @@ class AttitudeChain:
             self.nodes[:, FIELD : FIELD + 3] - solution.state[:-1, 10:11] * self.nodes[:, SWEEP : SWEEP + 3]
         )
         world = np.einsum("kij,kj->ki", solution.rotation[:-1], body)
-        off = world.copy()
+        length = np.hypot(world[:, 0], world[:, 1])
+        off = np.column_stack([length * np.arctan2(world[:, 0], world[:, 1]), length, world[:, 2]])
         off[:, 0] -= solution.state[:-1, 9]
         if seen.any():
-            off[:, 1] -= np.median(np.hypot(world[seen, 0], world[seen, 1]))
-            off[:, 2] -= np.median(world[seen, 2])
+            off[:, 1:] -= np.median(off[seen, 1:], axis=0)
         square = np.sum(off**2, axis=1) / self.model.mag_scatter**2
         return np.where(seen, 1.0 / (1.0 + square) ** 2, 0.0)
 

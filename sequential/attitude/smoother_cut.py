@@ -15,7 +15,8 @@ __all__ = ["attitude_chain"]
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 GAP = 3.0  # median intervals without a sample
-START = 0.5  # s at the beginning whose mean gives the first orientation
+UNKNOWN = 0.3  # s of a gap after which the orientation is begun anew
+START = 2.0  # s at the beginning whose mean gives the first orientation
 STILL_RATE, STILL_RIPPLE, STILL_ACCEL = np.radians(2.5), np.radians(1.0), 0.25
 STILL_GYRO_NOISE, STILL_ACCEL_NOISE = np.radians(2.5), 0.5  # standard deviations within a node
 STILL_REACH = 0.5  # s on either side
@@ -29,7 +30,7 @@ def attitude_chain(recording: ImuRecording, model: AttitudeModel, *, field: bool
     ------
     MissingStreamError, DataError
     """
-    from sequential.attitude.smoother_nodes_kernel import RATE
+    from sequential.attitude.smoother_nodes_kernel import LOST, RATE
 
     recording.require("gyro", "accel")
     gyro, accel = recording.gyro, recording.accel
@@ -46,8 +47,12 @@ def attitude_chain(recording: ImuRecording, model: AttitudeModel, *, field: bool
     nodes = integrate(samples, first, nothing)
     rest = _still(nodes)
     bias = nodes[rest, RATE : RATE + 3].mean(axis=0) if rest.any() else nothing
-    start = _start(nodes[: max(1, round(START / model.interval))])
-    return AttitudeChain(model, samples, first, nodes, nothing, rest, bias, start, mag is not None)
+    reach = max(1, round(START / model.interval))
+    fresh = np.full((len(nodes), 3, 3), np.nan)
+    for k in np.flatnonzero(nodes[:-1, LOST] > UNKNOWN):
+        fresh[k] = _start(nodes[k + 1 : k + 1 + reach])
+    start = _start(nodes[:reach])
+    return AttitudeChain(model, samples, first, nodes, nothing, rest, bias, start, fresh, mag is not None)
 
 
 def _intervals(recording: ImuRecording) -> tuple[Array, Array]:
@@ -113,14 +118,21 @@ def _departure(values: Array, reach: int) -> Array:
 
 
 def _start(nodes: Array) -> Array:
-    """(3, 3) rotation of the first node: up by the mean specific force, north by the mean field or any."""
-    from sequential.attitude.smoother_nodes_kernel import ACCEL, FIELD, FIELD_TIME
+    """(3, 3) rotation of the first node: up by the mean specific force, north by the mean field or any.
 
-    up = nodes[:, ACCEL : ACCEL + 3].mean(axis=0)
+    The gyro turns what the nodes saw into the frame of the first, so that the body may be turning.
+    """
+    from sequential.attitude.smoother_nodes_kernel import FIELD, FIELD_TIME, PUSH, TURN
+
+    up, north, turned = np.zeros(3), np.zeros(3), np.eye(3)
+    for node in nodes:
+        up += turned @ node[PUSH : PUSH + 3]
+        if node[FIELD_TIME] > 0:
+            north += turned @ node[FIELD : FIELD + 3]
+        turned = turned @ node[TURN : TURN + 9].reshape(3, 3)
     size = float(np.linalg.norm(up))
     up = up / size if size > 0 else np.array([0.0, 0.0, 1.0])
-    seen = nodes[nodes[:, FIELD_TIME] > 0, FIELD : FIELD + 3]
-    east = np.cross(seen.mean(axis=0), up) if len(seen) else np.zeros(3)
+    east = np.cross(north, up)
     if np.linalg.norm(east) < 1e-3:
         east = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
     east /= np.linalg.norm(east)

@@ -19,9 +19,10 @@ from sequential.attitude.smoother_steps_kernel import (
     SPREAD,
     STILL_RATE,
     STILL_SPEED,
+    UPRIGHT,
     VELOCITY,
     difference,
-    east_row,
+    heading_row,
     retract,
     step,
     step_noise,
@@ -54,14 +55,18 @@ def absorb(cov, xi, e, variance, out, i):
 
 @njit(f0(w2, w1, f0, f0, f1, w1, w1, f0), **compiled)
 def absorb_field(cov, xi, e, variance, row, work, out, gate):
-    """Take in a reading of the field's east component; beyond `gate` sigmas its variance grows.
+    """Take in a reading of the field's heading; beyond `gate` sigmas its variance grows.
 
     Returns the weight that this left it.
     """
     for j in range(SIZE):
-        work[j] = cov[1, j] * row[1] + cov[2, j] * row[2] + cov[EAST, j] * row[3] + cov[DELAY, j] * row[4]
-    s = work[1] * row[1] + work[2] * row[2] + work[EAST] * row[3] + work[DELAY] * row[4]
-    e -= row[1] * xi[1] + row[2] * xi[2] + row[3] * xi[EAST] + row[4] * xi[DELAY]
+        work[j] = cov[0, j] * row[0] + cov[1, j] * row[1] + cov[2, j] * row[2]
+        work[j] += cov[EAST, j] * row[3] + cov[DELAY, j] * row[4]
+    s = work[EAST] * row[3] + work[DELAY] * row[4]
+    e -= row[3] * xi[EAST] + row[4] * xi[DELAY]
+    for i in range(3):
+        s += work[i] * row[i]
+        e -= row[i] * xi[i]
     weight, distance = 1.0, e * e / (s + variance)
     if distance > gate * gate:
         weight = gate * gate / distance
@@ -128,11 +133,13 @@ def carry(xi, by_gyro, by_push, memory):
 
 
 @njit(
-    types.void(f2, b1, f1, f1, f2, f1, f2, types.boolean, types.boolean, w3, w2, w2, w3, w3, w3, w3, w2, w1),
+    types.void(
+        f2, b1, f1, f3, f1, f2, f1, f2, types.boolean, types.boolean, w3, w2, w2, w3, w3, w3, w3, w2, w1
+    ),
     **compiled,
 )
 def forward(
-    nodes, rest, weight, p, start_r, start_x, start_cov, field, around,
+    nodes, rest, weight, fresh, p, start_r, start_x, start_cov, field, around,
     rotation, state, deviation, cov, gains, by_gyro, by_push, rows, trust,
 ):  # fmt: skip
     """Filter K nodes into K + 1 states.
@@ -140,6 +147,7 @@ def forward(
     Parameters
     ----------
     nodes : (K, WIDTH) of `summarise`; `rest` (K,); `weight` (K,) of the field's readings, 0 leaves one out
+    fresh : (K, 3, 3) rotation at the end of nodes whose gap leaves it unknown, to begin with anew; else NaN
     p : settings, as in `smoother_steps_kernel`
     start_r, start_x, start_cov : prior mean and covariance (23, 23) of the first state
     field : whether the magnetometer takes part
@@ -168,10 +176,11 @@ def forward(
                 absorb(pk, xi, n[RATE + i] - x[BIAS + i], p[STILL_RATE] ** 2 / n[TIME], g[i], BIAS + i)
         speed = (p[STILL_SPEED] if rest[k] else p[SPREAD]) ** 2 / n[TIME]
         for i in range(3):
-            absorb(pk, xi, -x[VELOCITY + i], speed, g[3 + i], VELOCITY + i)
+            variance = speed if i < 2 else (UPRIGHT * p[SPREAD]) ** 2 / n[TIME]
+            absorb(pk, xi, -x[VELOCITY + i], variance, g[3 + i], VELOCITY + i)
         trust[k] = 1.0
         if field and weight[k] > 0.0 and n[FIELD_TIME] > 0.0:
-            e = east_row(n, r, x, rows[k])
+            e = heading_row(n, r, x, rows[k])
             variance = p[MAG] ** 2 / n[FIELD_TIME] / weight[k]
             trust[k] = absorb_field(pk, xi, e, variance, rows[k], work, g[6], np.inf if around else p[GATE])
         if not around:
@@ -198,4 +207,6 @@ def forward(
                 xi[i] += next_x[i] - state[k + 1, i]
         else:
             rotation[k + 1], state[k + 1] = next_r, next_x
+            if fresh[k, 0, 0] == fresh[k, 0, 0]:
+                rotation[k + 1] = fresh[k]
     deviation[count], cov[count] = xi, pk

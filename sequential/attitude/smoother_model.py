@@ -52,12 +52,12 @@ class AttitudeModel:
 
     interval: float = 0.2
     gyro_noise: float = math.radians(0.02)
-    gyro_scale_noise: float = 0.0012
+    gyro_scale_noise: float = 0.001
     gyro_bias_walk: float = math.radians(0.01)
     gyro_bias_sigma: float = math.radians(2.0)
     gyro_matrix_sigma: float = 0.003
     accel_noise: float = 0.01
-    accel_bias_sigma: float = 0.017
+    accel_bias_sigma: float = 0.013
     speed_spread: float = 3.0
     rest_gyro_noise: float = math.radians(0.01)
     rest_turn: float = math.radians(0.005)

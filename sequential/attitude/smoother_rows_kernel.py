@@ -21,9 +21,10 @@ from sequential.attitude.smoother_steps_kernel import (
     SPREAD,
     STILL_RATE,
     STILL_SPEED,
+    UPRIGHT,
     VELOCITY,
     difference,
-    east_row,
+    heading_row,
     retract,
     step,
     step_noise,
@@ -58,11 +59,15 @@ def whitened_rows(nodes, rest, weight, p, field, rotation, state, before, here, 
                 own[10 + i, BIAS + i], value[10 + i] = scale, scale * (n[RATE + i] - x[BIAS + i])
         scale = math.sqrt(n[TIME]) / (p[STILL_SPEED] if rest[k] else p[SPREAD])
         for i in range(3):
+            if i == 2:
+                scale = math.sqrt(n[TIME]) / (UPRIGHT * p[SPREAD])
             own[13 + i, VELOCITY + i], value[13 + i] = scale, -scale * x[VELOCITY + i]
         if field and weight[k] > 0.0 and n[FIELD_TIME] > 0.0:
             scale = math.sqrt(n[FIELD_TIME] * weight[k]) / p[MAG]
-            value[16] = scale * east_row(n, r, x, row)
-            own[16, 1], own[16, 2], own[16, EAST] = scale * row[1], scale * row[2], scale * row[3]
+            value[16] = scale * heading_row(n, r, x, row)
+            own[16, EAST] = scale * row[3]
+            for i in range(3):
+                own[16, i] = scale * row[i]
             fixed[16, DELAY - MOVING] = scale * row[4]
         step(n, rest[k], r, x, p, next_r, next_x, by_gyro, by_push)
         turn, walk, push, disturbed = step_noise(n, rest[k], p)

@@ -29,9 +29,12 @@ from sequential.attitude.smoother_nodes_kernel import (
     w2,
 )
 
-__all__ = ["difference", "east_row", "retract", "step", "step_noise"]
+__all__ = ["difference", "heading_row", "retract", "step", "step_noise"]
 
 ROTATION, BIAS, VELOCITY, EAST, DELAY, PULL, MATRIX, SIZE = 0, 3, 6, 9, 10, 11, 14, 23
+# The vertical velocity is held this much more loosely: it says nothing of the tilt, and a wrong scale of the
+# accelerometer ends there.
+UPRIGHT = 30.0
 # settings
 (GYRO, SCALE, WALK, PUSHED, SPREAD, STILL_RATE, STILL_SPEED, MAG, DISTURBED, MEMORY, GRAVITY, GATE,
  UNKNOWN_RATE, UNKNOWN_PUSH, RESTING, REFERENCE) = range(16)  # fmt: skip
@@ -137,14 +140,22 @@ def step_noise(n, rest, p):
 
 
 @njit(f0(f1, f2, f1, w1), **compiled)
-def east_row(n, r, x, row):
-    """East component of the field, which ought to be the disturbance: innovation, and its row (θ 3, d, τ)."""
+def heading_row(n, r, x, row):
+    """Innovation of the field's heading, and its row (θ 3, disturbance, delay).
+
+    The reading is the angle of the horizontal field from north times its length: the component towards east
+    while the angle is small, and still a way back where the heading is wrong by more than a right angle.
+    """
     a = n[FIELD] - x[DELAY] * n[SWEEP]
     b = n[FIELD + 1] - x[DELAY] * n[SWEEP + 1]
     c = n[FIELD + 2] - x[DELAY] * n[SWEEP + 2]
     east = r[0, 0] * a + r[0, 1] * b + r[0, 2] * c
     north = r[1, 0] * a + r[1, 1] * b + r[1, 2] * c
     up = r[2, 0] * a + r[2, 1] * b + r[2, 2] * c
-    row[0], row[1], row[2], row[3] = 0.0, up, -north, -1.0
-    row[4] = -(r[0, 0] * n[SWEEP] + r[0, 1] * n[SWEEP + 1] + r[0, 2] * n[SWEEP + 2])
-    return x[EAST] - east
+    length = math.sqrt(east * east + north * north) + 1e-9
+    c, s = north / length, east / length
+    row[0], row[1], row[2], row[3] = s * up, c * up, -length, -1.0
+    row[4] = 0.0
+    for i in range(3):
+        row[4] -= (c * r[0, i] - s * r[1, i]) * n[SWEEP + i]
+    return x[EAST] - length * math.atan2(east, north)
