@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from time import process_time
 
+import allan_figures
+import field_figures
 import numpy as np
 from measure.figures import Figure, publish, say
 
@@ -131,15 +133,10 @@ def coverage() -> dict[str, Figure]:
 
 def other_scripts() -> dict[str, Figure]:
     """Figures of the Allan deviations and of the field sensors."""
-    from importlib import import_module
-    from importlib.util import find_spec
-
-    found: dict[str, Figure] = {}
-    for name in ("allan_figures", "field_figures"):
-        if find_spec(name) is not None:
-            say(name)
-            found |= import_module(name).figures()
-    return found
+    say("field sensors")
+    found = field_figures.figures()
+    say("Allan deviations")
+    return found | allan_figures.figures()
 
 
 def main() -> int:
