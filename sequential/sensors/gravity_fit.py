@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.sensors.prior_fit import Fitted, Scatter, Unknowns, fit_with_scatter, maximise
+from sequential.sensors.prior_fit import Fitted, Scatter, Unknowns, fit_with_scatter, robust_inliers
 
 __all__ = [
     "NAMES",
@@ -25,7 +25,7 @@ __all__ = [
     "matrix_of",
     "norm_jacobian",
     "norms",
-    "robust_inliers",
+    "steady_dwells",
 ]
 
 Array = NDArray[np.float64]
@@ -112,20 +112,13 @@ def _model(parameters: Array, means: Array, gravity: float) -> tuple[Array, Arra
     return norms(parameters, means) - gravity, norm_jacobian(parameters, means)
 
 
-def robust_inliers(
+def steady_dwells(
     means: Array, covs: Array, gravity: float, start: Array, prior: Prior, *, shears: bool = True
 ) -> NDArray[np.bool_]:
-    """Dwells (K,) that are not far off a fit which bad ones cannot pull: Cauchy's loss, reweighted."""
+    """Dwells (K,) that are not far off a fit which bad ones cannot pull."""
     unknowns = Unknowns(start, _sigmas(start, gravity, prior, shears=shears))
-    parameters, variance = start.copy(), np.full(len(means), (0.05 * gravity) ** 2)
-    scale = np.sqrt(variance)
-    for _ in range(30):
-        parameters = maximise(lambda p: _model(p, means, gravity), variance, unknowns, parameters)
-        off = np.abs(norms(parameters, means) - gravity)
-        floor = _variance(parameters, means, covs) + (5 * prior.scatter * gravity) ** 2
-        scale = np.sqrt((1.4826 * np.median(off)) ** 2 + floor)
-        variance = scale**2 * (1 + (off / (2.385 * scale)) ** 2)
-    return np.asarray(np.abs(norms(parameters, means) - gravity) <= 8 * scale)
+    floor = _variance(start, means, covs) + (5 * prior.scatter * gravity) ** 2
+    return robust_inliers(lambda p: _model(p, means, gravity), floor, unknowns)
 
 
 def foreseen(means: Array, gravity: float, start: Array, prior: Prior, *, shears: bool = True) -> Array:

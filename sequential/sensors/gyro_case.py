@@ -67,7 +67,8 @@ class GyroCase:
         intervals = intervals_between(recording, leave, arrive)
         start, end = (_unit(accel.apply(raw)) for raw in (before, after))
         gain = 1.0 if recording.gyro_unit == "rad/s" else _nominal_gain(start, end, intervals, rest.bias)
-        clipped = (intervals.clipped * gain * intervals.dt.max() * np.ptp(intervals.raw) / 10) ** 2
+        step = float(np.median(intervals.dt[intervals.dt > 0]))
+        clipped = (intervals.clipped * gain * step * np.ptp(intervals.raw) / 10) ** 2
         noise = np.repeat(before_noise + after_noise + clipped, 2)
         return cls(before, after, accel, _root(accel.cov), intervals, noise, gain, rest)
 

@@ -18,7 +18,7 @@ from sequential.sensors.dwells import Dwells
 from sequential.sensors.finding import Finding
 from sequential.sensors.gyro_case import GyroCase
 from sequential.sensors.gyro_rest import GyroAtRest, bias_at_rest
-from sequential.sensors.prior_fit import Fitted, Scatter, Unknowns, fit_with_scatter
+from sequential.sensors.prior_fit import Fitted, Scatter, Unknowns, fit_with_scatter, robust_inliers
 from sequential.sensors.recording import ImuRecording
 
 __all__ = ["GyroBetweenDwells", "GyroFit"]
@@ -37,7 +37,7 @@ class GyroFit:
     move and as the accelerometer reads it: with nominal constants, with the fitted ones, and with constants
     fitted to the other moves.  `accel` is the accelerometer's calibration with what the moves add to it:
     much where its positions left a misalignment open.  `used` (S,) is False for a move that no
-    constants explain, `whole` (S,) False where the gyro reached the end of its range.
+    constants explain, `whole` (S,) False where readings are at the end of the gyro's range or missing.
     """
 
     calibration: AffineCalibration
@@ -106,7 +106,7 @@ class GyroBetweenDwells:
         _require_turned(recording.name, fit)
         return _result(recording, dwells, case, fit, chosen, moves)
 
-    def fit(self, case: GyroCase, used: Mask) -> Fitted:
+    def unknowns(self, case: GyroCase) -> Unknowns:
         """Parameters (12 + q,).
 
         The matrix over its nominal gain, row by row, the offset times that gain, and what is doubtful about
@@ -116,23 +116,48 @@ class GyroBetweenDwells:
         centre = np.concatenate([np.eye(3).ravel(), case.rest.bias * case.gain, np.zeros(doubts)])
         bias_sigma = np.sqrt(np.diag(case.rest.cov)) * case.gain + 1e-7
         matrix_sigma = np.where(np.eye(3, dtype=bool).ravel(), self.gain, self.cross)
-        unknowns = Unknowns(centre, np.concatenate([matrix_sigma, bias_sigma, np.ones(doubts)]))
+        return Unknowns(centre, np.concatenate([matrix_sigma, bias_sigma, np.ones(doubts)]))
+
+    def fit(self, case: GyroCase, used: Mask) -> Fitted:
+        """Most probable parameters from some of the moves."""
         chosen = case.only(used)
-        return fit_with_scatter(chosen.residuals, lambda _: chosen.noise, unknowns, self.scatter)
+        return fit_with_scatter(chosen.residuals, lambda _: chosen.noise, self.unknowns(case), self.scatter)
 
     def _without_impossible(self, case: GyroCase) -> tuple[Fitted, Mask]:
-        """Leave out moves that the others make impossible, worst first, a quarter of them at most."""
+        """Leave out moves that the others make impossible, and take back those doubted wrongly."""
         from scipy.special import stdtrit
 
-        used = np.ones(len(case.before), dtype=bool)
-        while True:
+        count = len(case.before)
+        floor = case.noise + (2 * self.scatter.guess) ** 2
+        used = robust_inliers(case.residuals, floor, self.unknowns(case), width=2, rounds=8)
+        if used.sum() < max(FEWEST, count // 2):
+            used = np.ones(count, dtype=bool)
+        fit = self.fit(case, used)
+        for _ in range(count):
+            score = np.empty(count)
+            score[used] = _left_out(fit)[1]
+            if not used.all():
+                score[~used] = _foreseen(case.only(~used), fit)
+            score /= -stdtrit(max(fit.freedom, 1.0), DOUBT / 4 / count)
+            worst = int(np.argmax(np.where(used, score, 0.0)))
+            best = int(np.argmin(np.where(used, np.inf, score)))
+            if not used[best] and score[best] < 1:
+                used[best] = True
+            elif score[worst] > 1 and used.sum() > FEWEST:
+                used[worst] = False
+            else:
+                break
             fit = self.fit(case, used)
-            score = _left_out(fit)[1]
-            worst = int(np.argmax(score))
-            limit = -stdtrit(max(fit.freedom, 1.0), DOUBT / 4 / len(used))
-            if score[worst] <= limit or (~used).sum() >= len(used) // 4 or used.sum() <= FEWEST:
-                return fit, used
-            used[np.flatnonzero(used)[worst]] = False
+        return fit, used
+
+
+def _foreseen(case: GyroCase, fit: Fitted) -> Array:
+    """Miss of moves (S,) that the fit has not seen, over its sigma."""
+    residual, J = case.residuals(fit.parameters)
+    residual, J = residual.reshape(-1, 2), J.reshape(-1, 2, J.shape[1])
+    noise = (case.noise.reshape(-1, 2) + fit.scatter**2)[:, :, None] * np.eye(2)
+    whole = noise + J @ fit.cov @ J.transpose(0, 2, 1)
+    return np.asarray(np.sqrt(np.einsum("si,sij,sj->s", residual, np.linalg.inv(whole), residual)))
 
 
 def _left_out(fit: Fitted) -> tuple[Array, Array]:
@@ -211,10 +236,8 @@ def _findings(seconds: Array, case: GyroCase, fit: Fitted, used: Mask) -> tuple[
     clipped = np.flatnonzero(case.intervals.clipped)
     if len(clipped):
         times = ", ".join(f"{seconds[k, 0]:.0f}-{seconds[k, 1]:.0f} s" for k in clipped)
-        what = (
-            f"the gyro reaches the end of its range in {len(clipped)} of {len(used)} moves, which weigh less"
-        )
-        found.append(Finding("warn", what, times, "move more slowly, or choose a wider range"))
+        what = f"the gyro's range ends, or samples are missing, in {len(clipped)} of {len(used)} moves"
+        found.append(Finding("warn", what, times, "they weigh less: move more slowly, or widen the range"))
     found += [
         Finding("warn", "no constants explain this move, it was left out", f"{a:.1f}-{b:.1f} s", "repeat it")
         for a, b in seconds[~used]

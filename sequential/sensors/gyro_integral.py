@@ -59,7 +59,10 @@ def intervals_between(recording: ImuRecording, start: Stamps, stop: Stamps) -> G
     for k, (a, b) in enumerate(zip(start.tolist(), stop.tolist(), strict=True)):
         raw[k, : b - a] = (gyro[a:b] + gyro[a + 1 : b + 1]) / 2
         dt[k, : b - a] = steps[a:b]
-    count = [int(clipped[a : b + 1].sum()) for a, b in zip(start, stop, strict=True)]
+    # samples that are missing are unknown as clipped ones are
+    lost = np.where(steps > 2.5 * np.median(steps), np.round(steps / np.median(steps)) - 1, 0)
+    pairs = zip(start.tolist(), stop.tolist(), strict=True)
+    count = [int(clipped[a : b + 1].sum() + lost[a:b].sum()) for a, b in pairs]
     return GyroIntervals(raw, dt, np.array(count))
 
 

@@ -20,7 +20,7 @@ from sequential.sensors.gravity_fit import (
     matrix_of,
     norm_jacobian,
     norms,
-    robust_inliers,
+    steady_dwells,
 )
 from sequential.sensors.positions import missing_positions
 from sequential.sensors.prior_fit import Fitted
@@ -98,7 +98,7 @@ class MultiPosition:
         start = nominal(means, self.gravity, si=dwells.accel_unit == "m/s^2")
         self._require_unit(dwells)
         self._require_observed(dwells, foreseen(means, self.gravity, start, self.prior, shears=self.shears))
-        used = robust_inliers(means, covs, self.gravity, start, self.prior, shears=self.shears)
+        used = steady_dwells(means, covs, self.gravity, start, self.prior, shears=self.shears)
         used, left_out, sigmas = self._cross_validated(dwells, used)
         fit = self._fit(dwells, used)
         sigmas_prior = np.sqrt(np.diag(fit.cov)) / fit.kept

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import NotConvergedError
 
-__all__ = ["Fitted", "Scatter", "Unknowns", "fit_with_scatter", "maximise"]
+__all__ = ["Fitted", "Scatter", "Unknowns", "fit_with_scatter", "maximise", "robust_inliers"]
 
 Array = NDArray[np.float64]
 Model = Callable[
@@ -124,6 +124,27 @@ def maximise(model: Model, variance: Array, unknowns: Unknowns, start: Array) ->
     raise NotConvergedError(
         f"the calibration did not settle in {ITERATIONS} steps: are all dwells still, and in one unit?"
     )
+
+
+def robust_inliers(
+    model: Model, noise: Array, unknowns: Unknowns, *, width: int = 1, rounds: int = 30
+) -> NDArray[np.bool_]:
+    """Groups of `width` residuals (m / width,) that are not far off a fit which bad ones cannot pull.
+
+    Cauchy's loss, reweighted from equal weights on; `noise` (m,) is a variance that no scale goes below.
+    """
+    parameters, off = unknowns.centre, np.zeros(len(noise) // width)
+    floor = noise.reshape(-1, width).mean(axis=1)
+    variance = np.full(len(off), float(np.sum(model(parameters)[0] ** 2)) / len(noise) + floor.max())
+    scale = np.sqrt(variance)
+    for _ in range(rounds):
+        parameters = maximise(model, np.repeat(variance, width), unknowns, parameters)
+        before, off = off, np.linalg.norm(model(parameters)[0].reshape(-1, width), axis=1)
+        scale = np.sqrt((1.4826 * np.median(off)) ** 2 + floor)
+        variance = scale**2 * (1 + (off / (2.385 * scale)) ** 2)
+        if np.abs(off - before).max() <= 0.01 * scale.min():
+            break
+    return np.asarray(off <= 8 * scale)
 
 
 def _likely_scatter(
