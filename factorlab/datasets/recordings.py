@@ -15,6 +15,7 @@ from sequential.errors import DataError
 from sequential.readers import read_broad, read_imu, read_repoimu
 from sequential.readers.broad import is_broad
 from sequential.readers.imu.arrays import is_imu_tk_text
+from sequential.readers.imu.euroc import euroc_truth
 from sequential.sensors.recording import ImuRecording
 
 __all__ = ["RECORDINGS", "OpenedRecording", "ReferenceAttitude", "open_recording"]
@@ -37,8 +38,8 @@ ENDINGS = {".csv", ".npz", ".mat", ".hdf5", ".ulg", ".zip", ".json"}
 class ReferenceAttitude(NamedTuple):
     """What an instrument far better than the IMU saw.
 
-    `world_q_body` (N, 4) is w x y z, world east-north-up, NaN where nothing was seen; `movement` (N,) marks
-    the samples that are scored.
+    `world_q_body` (N, 4) is w x y z, world east-north-up (EuRoC's has z up and a heading of its own), NaN
+    where nothing was seen; `movement` (N,) marks the samples that are scored.
     """
 
     world_q_body: NDArray[np.float64]
@@ -82,11 +83,15 @@ def open_recording(
             recording, seen = read_broad(path)
             return OpenedRecording(recording, ReferenceAttitude(seen.world_q_body, seen.movement), path)
         if _is_repoimu(path):
-            recording, world_q_body = read_repoimu(path)
+            recording, vicon = read_repoimu(path)
             everywhere = np.ones(len(recording), dtype=bool)
-            return OpenedRecording(recording, ReferenceAttitude(world_q_body, everywhere), path)
+            return OpenedRecording(recording, ReferenceAttitude(vicon, everywhere), path)
     recording = read_imu(path, kind=kind, units=units, columns=columns, rate=stated)
-    return OpenedRecording(recording, None, path)
+    world_q_body = euroc_truth(path, recording.t) if path.is_dir() else None
+    if world_q_body is None:
+        return OpenedRecording(recording, None, path)
+    known = np.isfinite(world_q_body[:, 0])
+    return OpenedRecording(recording, ReferenceAttitude(world_q_body, known), path)
 
 
 def _of_a_set(source: str, rate: float | None) -> tuple[Path, float | None]:

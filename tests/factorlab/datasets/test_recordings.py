@@ -6,7 +6,7 @@ import pytest
 from factorlab.datasets.recordings import RECORDINGS, open_recording
 from sequential.errors import DataError
 from sequential.readers import write_imu
-from sequential.sensors import ImuRecording
+from sequential.sensors import ImuRecording, simulate_imu, tumble
 
 
 def test_trials_of_broad_by_number(data_dir):
@@ -42,6 +42,27 @@ def test_names_that_are_unknown(tmp_path, monkeypatch):
     monkeypatch.setenv("FACTORLAB_DATA", str(tmp_path))
     with pytest.raises(DataError, match="set FACTORLAB_DATA to the folder that holds imu/broad"):
         open_recording("broad:07")
+
+
+def test_the_truth_of_euroc(tmp_path, rng):
+    imu, truth = simulate_imu(tumble(5.0, rng), rng, rate=200.0, field=None)
+    folder = tmp_path / "V1_01" / "mav0"
+    for part in ("imu0", "state_groundtruth_estimate0"):
+        (folder / part).mkdir(parents=True)
+    head = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1]"
+    lines = [f"{head},a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"]
+    for t, w, a in zip(imu.t.tolist(), imu.gyro.tolist(), imu.accel.tolist(), strict=True):
+        lines.append(",".join(map(repr, (t, *w, *a))))
+    (folder / "imu0" / "data.csv").write_text("\n".join(lines))
+    head = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
+    attitudes = zip(truth.t.tolist(), truth.world_q_body.tolist(), strict=True)
+    rows = [f"{t + 1000},0,0,0,{','.join(map(repr, q))}" for t, q in attitudes]
+    (folder / "state_groundtruth_estimate0" / "data.csv").write_text("\n".join([head, *rows[100:]]))
+    opened = open_recording(tmp_path / "V1_01")
+    seen = opened.truth.movement
+    assert not seen[:99].any()
+    assert seen[100:].all()
+    np.testing.assert_allclose(opened.truth.world_q_body[100:], truth.world_q_body[100:], atol=1e-12)
 
 
 def test_a_file_of_ones_own(tmp_path):
