@@ -44,6 +44,17 @@ def test_names_that_are_unknown(tmp_path, monkeypatch):
         open_recording("broad:07")
 
 
+def test_the_truth_of_repoimu(tmp_path, rng):
+    imu, truth = simulate_imu(tumble(5.0, rng), rng)
+    groups = "Time (s);Vicon Orientation;;;;IMU Acceleration;;;IMU Gyroscope;;;IMU Magnetometer;;;"
+    table = np.column_stack([imu.seconds, truth.world_q_body, imu.accel, imu.gyro, imu.mag / 47.0])
+    header = f"{groups}\n;W;X;Y;Z;X;Y;Z;X;Y;Z;X;Y;Z;"
+    np.savetxt(tmp_path / "TStick.csv", table, delimiter=";", header=header, comments="")
+    opened = open_recording(tmp_path / "TStick.csv")
+    np.testing.assert_allclose(opened.truth.world_q_body, truth.world_q_body, atol=1e-12)
+    assert opened.truth.movement.all()
+
+
 def test_the_truth_of_euroc(tmp_path, rng):
     imu, truth = simulate_imu(tumble(5.0, rng), rng, rate=200.0, field=None)
     folder = tmp_path / "V1_01" / "mav0"
