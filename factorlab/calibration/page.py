@@ -14,6 +14,7 @@ from sequential.sensors import best_next_direction, c_header, kalibr_yaml
 
 __all__ = ["calibration_document", "export_files", "up_of"]
 
+EQUATION = "calibrated = matrix · (raw − offset), in the axes of the chip."
 CONSTANTS = (
     "calibrated = matrix · (raw − offset). The frame's x axis is the accelerometer's own, its y axis lies in "
     "the plane of the accelerometer's x and y; gravity alone cannot show how the case lies in that frame."
@@ -63,7 +64,8 @@ def _sections(done: Calibrated, parameters: tuple[Parameter, ...]) -> list[Secti
     from factorlab.report import calibration_figures as figures
 
     table = _constants(parameters)
-    found = [Section("Constants", CONSTANTS, table, lambda: figures.intervals(parameters), CONSTANTS_READ)]
+    words = CONSTANTS if done.accel is not None else EQUATION
+    found = [Section("Constants", words, table, lambda: figures.intervals(parameters), CONSTANTS_READ)]
     if done.accel is not None:
         following = best_next_direction(up_of(done))[1]
         next_one = f"The most useful next position, farthest from all so far: {following}."
@@ -107,7 +109,7 @@ def _moves(done: Calibrated) -> Table:
     assert fit is not None  # noqa: S101 - the caller has looked
     angles = np.degrees([fit.before, fit.after, fit.left_out])
     columns = np.stack([*fit.seconds.T, *angles], axis=1).round(4).tolist()
-    words = np.where(fit.whole, np.where(fit.used, "yes", "no"), "range reached").tolist()
+    words = np.where(fit.whole, np.where(fit.used, "yes", "no"), "range or gap").tolist()
     rows = tuple((k + 1, *row, words[k]) for k, row in enumerate(columns))
     units = (("from", "s"), ("to", "s"), ("before", "°"), ("after", "°"), ("left out", "°"))
     return Table(("move", *units, "used"), rows, digits=4)

@@ -46,6 +46,8 @@ def parameters_of(done: Calibrated) -> tuple[Parameter, ...]:
         found += _accel(done.calibration.accel, factor, crossed=crossed)
     if done.calibration.gyro is not None:
         freedom = max(len(done.dwells) - 1.0, 1.0) if done.gyro is None else done.gyro.fit.freedom
+        if done.turns is not None:
+            freedom = np.inf  # how exactly the angles are known was given
         kept = _kept(done)
         found += _gyro(done.calibration.gyro, _t95(freedom), kept < VAGUE, crossed=done.gyro is not None)
     return tuple(found)
@@ -118,4 +120,4 @@ def _t95(freedom: float) -> float:
     """How many standard deviations hold 95 %."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(max(freedom, 1.0), 0.975))
+    return float(stdtrit(min(max(freedom, 1.0), 1e9), 0.975))

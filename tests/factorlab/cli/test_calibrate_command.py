@@ -105,6 +105,7 @@ def test_gyro_at_rest_and_by_turns(folder, tmp_path):
     assert done.exit_code == 0, done.stderr
     found = {p["name"]: p for p in json.loads(done.stdout)["parameters"]}
     assert found["gain y"]["value"] == pytest.approx(1.03, abs=5e-3)
+    assert found["gain y"]["interval"][1] - found["gain y"]["interval"][0] < 0.05
     assert not found["gain x"]["observed"]
 
 
