@@ -99,9 +99,7 @@ def move_residuals(done: Calibrated) -> Figure | None:
     ax.semilogy(k, np.degrees(fit.after), "o", color=AFTER, label="fitted", markersize=4)
     ax.semilogy(k, np.degrees(fit.left_out), "x", color=LEFT_OUT, label="fitted without it", markersize=5)
     for one in np.flatnonzero(~fit.whole):
-        ax.axvspan(
-            one + 0.6, one + 1.4, color="#f3e3d3", zorder=0, label="gyro's range reached, or samples missing"
-        )
+        ax.axvspan(one + 0.6, one + 1.4, color="#f3e3d3", zorder=0, label="range reached, or gap")
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     ax.set(xlabel="move", ylabel="gravity arrives off by, °")
     legend_below(figure, ax)
