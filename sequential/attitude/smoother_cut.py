@@ -70,7 +70,7 @@ def _field(recording: ImuRecording) -> Array | None:
     Raises
     ------
     DataError
-        where the body turns and the field does not.
+        where the body turns and the field does not, or where there is none.
     """
     mag, turning = recording.mag, recording.gyro
     if mag is None or turning is None:
@@ -78,7 +78,13 @@ def _field(recording: ImuRecording) -> Array | None:
     norm = np.linalg.norm(mag, axis=1)
     known = np.isfinite(norm) & (norm > 0)
     if not known.any():
-        return None
+        if np.isnan(norm).all():
+            return None
+        msg = (
+            f"mag of recording {recording.name!r} is zero throughout: the magnetometer did not answer; give the "
+            "recording without it for a heading that starts at an arbitrary direction"
+        )
+        raise DataError(msg)
     if known.sum() > 2 and np.all(np.ptp(mag[known], axis=0) == 0) and np.ptp(turning) > STUCK_RATE:
         msg = (
             f"mag of recording {recording.name!r} never changes although the gyro turns: the magnetometer is "

@@ -49,6 +49,10 @@ def test_a_stuck_magnetometer_is_named(world):
     stuck = ImuRecording(good.t, good.accel, good.gyro, np.tile([20.0, 1.0, -40.0], (len(t), 1)))
     with pytest.raises(DataError, match="stuck"):
         AttitudeSmoother().estimate(stuck)
+    with pytest.raises(DataError, match="zero throughout"):
+        AttitudeSmoother().estimate(ImuRecording(good.t, good.accel, good.gyro, np.zeros((len(t), 3))))
+    never = ImuRecording(good.t, good.accel, good.gyro, np.full((len(t), 3), np.nan))
+    assert AttitudeSmoother().estimate(never).magnetic_disturbance is None
 
 
 def test_a_setting_out_of_range_is_named():
