@@ -81,8 +81,8 @@ def _field(recording: ImuRecording) -> Array | None:
         if np.isnan(norm).all():
             return None
         msg = (
-            f"mag of recording {recording.name!r} is zero throughout: the magnetometer did not answer; give the "
-            "recording without it for a heading that starts at an arbitrary direction"
+            f"mag of recording {recording.name!r} is zero throughout: the magnetometer did not answer; "
+            "give the recording without it for a heading that starts at an arbitrary direction"
         )
         raise DataError(msg)
     if known.sum() > 2 and np.all(np.ptp(mag[known], axis=0) == 0) and np.ptp(turning) > STUCK_RATE:
