@@ -37,6 +37,8 @@ class Mahony(AttitudeFilter):
     bias_limit : the bias stays within ± this on every axis, rad/s
     error_limit : e of the accelerometer is shortened to this (the sine of an angle), so that accelerations,
         which are large and short, count no more than a small tilt; infinity is the published filter
+    lasting_time : the limit grows by the length of the error's mean over this, s, in the world's axes: what a
+        bias does to the tilt lasts there, and is not to be held off
     heading_gate : a heading further off than this, rad, is held to be a magnetic disturbance …
     heading_timeout : … until it has been for so long, s
     start_gain, start_time : k_P begins at the first and reaches `gain` after the second, s; meanwhile neither
@@ -55,9 +57,9 @@ class Mahony(AttitudeFilter):
     Notes
     -----
     Mahony, Hamel, Pflimlin 2008, Nonlinear complementary filters on the special orthogonal group, equations
-    32 and 48.  As published: `Mahony.as_published(gain, integral_gain)`.  State (18,) of `step`: quaternion,
+    32 and 48.  As published: `Mahony.as_published(gain, integral_gain)`.  State (20,) of `step`: quaternion,
     bias (3), time, time since the last field, time out of the gate, low-passed gyro (3) and accelerometer
-    (3), time at rest, whether the heading is known.
+    (3), time at rest, whether the heading is known, lasting error (2).
     """
 
     gain: float = 0.5
@@ -65,6 +67,7 @@ class Mahony(AttitudeFilter):
     integral_gain: float = 0.0005
     bias_limit: float = 0.1
     error_limit: float = 0.05
+    lasting_time: float = 20.0
     heading_gate: float = math.radians(20.0)
     heading_timeout: float = 20.0
     start_gain: float = 10.0
@@ -82,7 +85,8 @@ class Mahony(AttitudeFilter):
             {
                 name: getattr(self, name)
                 for name in (
-                    "gain", "bias_limit", "error_limit", "heading_gate", "heading_timeout", "start_gain",
+                    "gain", "bias_limit", "error_limit", "lasting_time", "heading_gate", "heading_timeout",
+                    "start_gain",
                     "rest_gyro", "rest_accel", "rest_time", "rest_constant",
                 )
             },
@@ -117,18 +121,18 @@ class Mahony(AttitudeFilter):
 
     @property
     def settings(self) -> Array:
-        """(15,) for the compiled step."""
+        """(16,) for the compiled step."""
         gate = math.cos(self.heading_gate) if self.heading_gate < math.pi else -2.0
         values = (
             self.gain, self.heading_gain, self.integral_gain, self.bias_limit, self.start_gain,
             self.start_time, 1.0 / 12.0 if self.order == 3 else 0.0, 0.0 if self.tilt_by_field else 1.0,
             self.error_limit, gate, self.heading_timeout, self.rest_gyro, self.rest_accel, self.rest_time,
-            self.rest_constant,
+            self.rest_constant, self.lasting_time,
         )  # fmt: skip
         return np.array(values)
 
     def start(self, gyro: ArrayLike, accel: ArrayLike) -> Array:
-        """State (18,) from a first sample: level by the accelerometer, yaw 0, no bias."""
+        """State (20,) from a first sample: level by the accelerometer, yaw 0, no bias."""
         from sequential.attitude.mahony_kernel import STATE, start_mahony
 
         state = np.zeros(STATE)
@@ -138,7 +142,7 @@ class Mahony(AttitudeFilter):
     def step(
         self, state: ArrayLike, gyro: ArrayLike, accel: ArrayLike, mag: ArrayLike | None, dt: float
     ) -> Array:
-        """Next state (18,), dt seconds after the last sample."""
+        """Next state (20,), dt seconds after the last sample."""
         from sequential.attitude.mahony_kernel import STATE, step_mahony
 
         own = own_state(state, STATE, "Mahony")

@@ -4,11 +4,11 @@ Settings p: 0 k_P, 1 k_P of the heading, 2 k_I, 3 limit of the bias (rad/s), 4 k
 the quick start (s), 6 third-order coefficient of a turn, 7 whether the magnetometer turns about the vertical
 only, 8 limit of the accelerometer's error (sine), 9 gate of the heading error (cosine), 10 its timeout (s),
 11 and 12 what a gyro (rad/s) and an accelerometer (m/s²) at rest depart by, 13 how long rest lasts before it
-counts (s), 14 time constant of the bias at rest (s).
+counts (s), 14 time constant of the bias at rest (s), 15 of the lasting error (s).
 
 State s: 0-3 quaternion, 4-6 bias, 7 time since the start, 8 time since the last field, 9 for how long the
 field has been out of its gate, 10-12 and 13-15 gyro and accelerometer low-passed, 16 time at rest,
-17 whether the heading is known.
+17 whether the heading is known, 18-19 the lasting error, east and north.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from sequential.attitude.turning_kernel import (
 
 __all__ = ["STATE", "run_mahony", "start_mahony", "step_mahony"]
 
-STATE = 18
+STATE = 20
 PAUSE = 1.0  # s: nothing is integrated over a longer one
 OLDEST = 0.2  # s that one reading of the field stands for at most
 SMOOTH = 0.5  # s, time constant of what rest is judged by
@@ -67,6 +67,18 @@ def rest(s, w, a, dt, p):
     if s[16] > p[13]:
         for i in range(3):
             s[4 + i] += dt / (p[14] + dt) * (s[10 + i] - s[4 + i])
+
+
+@njit(f0(w1, f0, f0, f0, f0, f1), **compiled)
+def limit_of(s, ex, ey, ez, dt, p):
+    """What the accelerometer's error is shortened to: a tilt error lasts in the world, a push does not."""
+    w, x, y, z = s[0], s[1], s[2], s[3]
+    east = (1.0 - 2.0 * (y * y + z * z)) * ex + 2.0 * (x * y - w * z) * ey + 2.0 * (x * z + w * y) * ez
+    north = 2.0 * (x * y + w * z) * ex + (1.0 - 2.0 * (x * x + z * z)) * ey + 2.0 * (y * z - w * x) * ez
+    keep = dt / (p[15] + dt)
+    s[18] += keep * (east - s[18])
+    s[19] += keep * (north - s[19])
+    return p[8] + math.sqrt(s[18] * s[18] + s[19] * s[19])
 
 
 @njit(types.UniTuple(f0, 3)(w1, f1, f0, f1), **compiled)
@@ -129,8 +141,9 @@ def step_mahony(s, w, a, m, dt, p):
         ey = scale * (a[2] * vx - a[0] * vz)
         ez = scale * (a[0] * vy - a[1] * vx)
         size = math.sqrt(ex * ex + ey * ey + ez * ez)
-        if size > p[8] and s[7] >= p[5]:
-            ex, ey, ez = ex * p[8] / size, ey * p[8] / size, ez * p[8] / size
+        limit = limit_of(s, ex, ey, ez, dt, p)
+        if size > limit and s[7] >= p[5]:
+            ex, ey, ez = ex * limit / size, ey * limit / size, ez * limit / size
         ex, ey, ez = ex * dt, ey * dt, ez * dt
     mx, my, mz = of_field(s, m, dt, p)
     boost = 0.0
