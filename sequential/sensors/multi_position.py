@@ -225,7 +225,8 @@ class MultiPosition:
         alone = np.flatnonzero(used & (sigmas > ALONE * self.gravity)) + 1
         if len(alone):
             which = ", ".join(str(k) for k in alone)
-            what = f"nothing checks dwell{'s' * (len(alone) > 1)} {which}: without it an axis is open"
+            one, them = ("dwell", "it") if len(alone) == 1 else ("dwells", "one of them")
+            what = f"nothing checks {one} {which}: without {them} an axis is open"
             found.append(Finding("warn", what, "", "hold such a position once more"))
         elif fit.freedom < 3:
             unknowns = 9 if self.shears else 6

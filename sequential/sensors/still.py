@@ -29,7 +29,7 @@ class StillDetector:
     Parameters
     ----------
     window : length over which a variance is taken, s
-    shortest : dwells below this are left out, s
+    shortest : dwells below this are left out, s; half a window at either end is not used
     initial : seconds from the start that are known to be still; None: the level of rest is the most
         common one of the recording
     factor : variance over the level of rest up to which a window is still; None: where the recording's
@@ -94,7 +94,8 @@ class StillDetector:
         variance, _, threshold = self.levels(recording)
         still = (variance <= threshold) & ~self._turning(recording)
         half = self.samples(recording) // 2
-        fewest = max(3, round(self.shortest * recording.rate))
+        certain = self.shortest - min(self.window, self.shortest / 2)
+        fewest = max(3, round(certain * recording.rate))
         gap = round(self.knock * recording.rate) + 2 * half
         found = []
         for start, stop in _bridged(still, gap, recording):

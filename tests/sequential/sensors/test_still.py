@@ -38,6 +38,12 @@ def test_dwells_are_found_where_they_are(rng, initial):
         assert (rows[0] + 3) // 400 == k
 
 
+def test_short_dwells_are_enough(rng):
+    imu, _ = recorded(attitudes(12, rng), rng, dwell=1.2, travel=0.7)
+    assert len(StillDetector().find(imu)) == 12
+    assert not StillDetector(shortest=2.0).find(imu)
+
+
 def test_a_scale_of_the_readings_changes_nothing(rng):
     imu, _ = recorded(attitudes(5, rng), rng)
     raw = ImuRecording(imu.t, imu.accel * 1000.0, accel_unit="counts")
