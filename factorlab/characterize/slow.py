@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,6 +22,7 @@ from sequential.sensors import (
     fit_noise,
     imu_noise,
 )
+from sequential.sensors.imu_noise import filter_noise
 
 __all__ = ["SlowNoise", "slow_noise"]
 
@@ -61,12 +62,15 @@ def slow_noise(name: str, channels: tuple[Channel, ...]) -> SlowNoise:
     deviations: dict[str, AllanDeviation] = {}
     fits: dict[str, NoiseFit] = {}
     said: list[Finding] = []
-    report = _of_imu(name, groups, said)
-    if report is not None:
-        for group, three in report.fits.items():
-            fits |= dict(zip(AXES[group], three, strict=True))
-            deviations[group] = report.deviations[group]
+    three: dict[str, tuple[NoiseFit, NoiseFit, NoiseFit]] = {}
+    rate = float("nan")
+    for report in _reports(name, groups, said):
+        three |= report.fits
+        deviations |= report.deviations
+        rate = report.rate
         said += [Finding("warn", note.rstrip(".")) for note in report.notes]
+    for group, own_fits in three.items():
+        fits |= dict(zip(AXES[group], own_fits, strict=True))
     for group, own in groups.items():
         if group in deviations:
             continue
@@ -74,25 +78,25 @@ def slow_noise(name: str, channels: tuple[Channel, ...]) -> SlowNoise:
             deviations[group] = _of_group(own, fits)
         except FactorlabError as fault:
             said.append(Finding("warn", f"no Allan deviation of {group}: {_plain(fault)}"))
-    if report is None:
-        return SlowNoise(deviations, fits, findings=tuple(said))
-    return SlowNoise(deviations, fits, report.noise, report.bounds, report.rate, tuple(said))
+    noise, bounds = filter_noise(three) if set(three) == set(INERTIAL) else (None, ())
+    return SlowNoise(deviations, fits, noise, bounds, rate, tuple(said))
 
 
-def _of_imu(name: str, groups: Mapping[str, list[Channel]], said: list[Finding]) -> ImuNoiseReport | None:
-    """Accelerometer and gyro in SI units through `imu_noise`; None where there is none, or it refuses."""
+def _reports(name: str, groups: Mapping[str, list[Channel]], said: list[Finding]) -> Iterator[ImuNoiseReport]:
+    """Accelerometer and gyro in SI units through `imu_noise`, each apart where it has stamps of its own."""
     own: dict[str, Any] = {
         group: np.column_stack([channel.values for channel in groups[group]])
         for group, unit in INERTIAL.items()
         if group in groups and len(groups[group]) == 3 and groups[group][0].unit == unit
     }
-    if not own:
-        return None
-    try:
-        return imu_noise(ImuRecording(groups[next(iter(own))][0].t, name=name, **own))
-    except FactorlabError as fault:
-        said.append(Finding("warn", f"no Allan deviation of the whole IMU: {_plain(fault)}"))
-        return None
+    stamps = {group: groups[group][0].t for group in own}
+    shared = len({(len(t), int(t[0]), int(t[-1])) for t in stamps.values()}) == 1
+    for together in [own] if own and shared else [{group: values} for group, values in own.items()]:
+        try:
+            yield imu_noise(ImuRecording(stamps[next(iter(together))], name=name, **together))
+        except FactorlabError as fault:
+            which = "the whole IMU" if len(together) > 1 else next(iter(together))
+            said.append(Finding("warn", f"no Allan deviation of {which}: {_plain(fault)}"))
 
 
 def _of_group(channels: list[Channel], fits: dict[str, NoiseFit]) -> AllanDeviation:

@@ -120,8 +120,9 @@ def characterize_and_show(settings: Settings) -> int:
 
 
 def _study(settings: Settings) -> Study:
-    from factorlab.characterize import channels_of, read_columns, study
+    from factorlab.characterize import read_columns, study
     from factorlab.characterize.engine import still_part
+    from factorlab.characterize.phone import with_own_samples
     from factorlab.cli.progress import bar
 
     window = _window(settings.still)
@@ -136,7 +137,8 @@ def _study(settings: Settings) -> Study:
         from sequential.sensors.health import inspect
 
         recording = read_imu(settings.log, kind=settings.kind, units=settings.units, rate=settings.rate)
-        channels, findings, name = channels_of(recording), inspect(recording), recording.name
+        channels, findings = with_own_samples(settings.log, recording, inspect(recording), settings.units)
+        name = recording.name
         if window is None and not settings.step:
             window = still_part(recording)
     with bar(name, shown=sys.stderr.isatty()) as progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +16,7 @@ from sequential.sensors.noise_fit import NoiseFit, fit_noise
 from sequential.sensors.recording import ImuRecording
 from sequential.sensors.stretch import longest_even_stretch, longest_still_stretch
 
-__all__ = ["ImuNoiseReport", "imu_noise"]
+__all__ = ["ImuNoiseReport", "filter_noise", "imu_noise"]
 
 Array = NDArray[np.float64]
 UNITS = {"gyro": "rad/s", "accel": "m/s²"}
@@ -76,16 +77,21 @@ def imu_noise(recording: ImuRecording) -> ImuNoiseReport:
         deviations[name] = allan_deviation(values, rate)
         x, y, z = (_fit_axis(values[:, axis], rate, name, axis, recording.name) for axis in range(3))
         fits[name] = (x, y, z)
-    noise, bounds = None, []
-    if len(sensors) == 2:
-        numbers = {}
-        for name in sensors:
-            numbers[f"{name}_density"] = _together(fits[name], "N")[0]
-            numbers[f"{name}_bias_walk"], seen = _together(fits[name], "K")
-            if not seen:
-                bounds.append(f"{name}_bias_walk")
-        noise = ImuNoise(**numbers)
-    return ImuNoiseReport(noise, tuple(bounds), fits, deviations, rate, stretch.duration, (*notes, *more))
+    noise, bounds = filter_noise(fits) if len(sensors) == 2 else (None, ())
+    return ImuNoiseReport(noise, bounds, fits, deviations, rate, stretch.duration, (*notes, *more))
+
+
+def filter_noise(
+    fits: Mapping[str, tuple[NoiseFit, NoiseFit, NoiseFit]],
+) -> tuple[ImuNoise, tuple[str, ...]]:
+    """Four numbers from the fits of "gyro" and "accel", and which are upper bounds; see `imu_noise`."""
+    numbers, bounds = {}, []
+    for name in UNITS:
+        numbers[f"{name}_density"] = _together(fits[name], "N")[0]
+        numbers[f"{name}_bias_walk"], seen = _together(fits[name], "K")
+        if not seen:
+            bounds.append(f"{name}_bias_walk")
+    return ImuNoise(**numbers), tuple(bounds)
 
 
 def _fit_axis(values: Array, rate: float, sensor: str, axis: int, name: str) -> NoiseFit:
