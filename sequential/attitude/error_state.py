@@ -165,8 +165,8 @@ class ErrorStateAttitude(AttitudeFilter):
 
     @property
     def name(self) -> str:
-        """error_state."""
-        return "error_state"
+        """error-state."""
+        return "error-state"
 
     @property
     def settings(self) -> Array:
