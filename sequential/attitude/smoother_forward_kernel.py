@@ -171,13 +171,14 @@ def forward(
     for k in range(count):
         n, g, x, r = nodes[k], gains[k], state[k], rotation[k]
         g[:, :] = 0.0
-        if rest[k]:
-            for i in range(3):
-                absorb(pk, xi, n[RATE + i] - x[BIAS + i], p[STILL_RATE] ** 2 / n[TIME], g[i], BIAS + i)
         speed = (p[STILL_SPEED] if rest[k] else p[SPREAD]) ** 2 / n[TIME]
-        for i in range(3):
-            variance = speed if i < 2 else (UPRIGHT * p[SPREAD]) ** 2 / n[TIME]
-            absorb(pk, xi, -x[VELOCITY + i], variance, g[3 + i], VELOCITY + i)
+        for i in range(0 if rest[k] else 3, 6):
+            if i < 3:
+                at, seen, variance = BIAS + i, n[RATE + i], p[STILL_RATE] ** 2 / n[TIME]
+            else:
+                at, seen = VELOCITY + i - 3, 0.0
+                variance = speed if i < 5 else (UPRIGHT * p[SPREAD]) ** 2 / n[TIME]
+            absorb(pk, xi, seen - x[at], variance, g[i], at)
         trust[k] = 1.0
         if field and weight[k] > 0.0 and n[FIELD_TIME] > 0.0:
             e = heading_row(n, r, x, rows[k])
