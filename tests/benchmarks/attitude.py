@@ -208,6 +208,20 @@ def smoothing_speed(recordings: list[ImuRecording], samples: int) -> dict[str, F
     }
 
 
+def graph_agreement(trial: Trial) -> dict[str, Figure]:
+    """The smoother's graph beside its chain: the largest angle between them, and what GTSAM takes."""
+    from factorlab.graph import AttitudeGraph
+
+    chain, graph = our_filters()[SMOOTHER], AttitudeGraph()
+    own, other = chain.estimate(trial.recording), graph.estimate(trial.recording)
+    apart = attitude_error(other.world_q_body, own.world_q_body).errors[:, 0].max()
+    spent = cpu_seconds({"graph": lambda: graph.estimate(trial.recording)}, rounds=3)["graph"]
+    return {
+        "smoother_graph_apart": Figure(float(np.degrees(apart)), "deg", f"largest on trial {trial.number}"),
+        "speed_smoother_graph": Figure(1e6 * spent / len(trial.recording), "µs", "a sample, by GTSAM"),
+    }
+
+
 def every_trial(scores: Table) -> dict[str, Figure]:
     """Every filter on every trial, and all of them as two tables on stderr."""
     names = list(next(iter(scores.values())))
@@ -231,7 +245,8 @@ def main() -> int:
     every = trials()
     scores = table(every)
     say("speed")
-    return publish(accuracy(scores) | honesty(scores) | speed(every) | every_trial(scores))
+    figures = accuracy(scores) | honesty(scores) | speed(every) | graph_agreement(every[0])
+    return publish(figures | every_trial(scores))
 
 
 if __name__ == "__main__":
