@@ -43,19 +43,6 @@ def log(recording, tmp_path):
     return tmp_path / "imu.csv"
 
 
-@pytest.fixture
-def table(tmp_path, rng):
-    """A thermometer with a semicolon and a decimal comma, and what it says."""
-    t = np.arange(1500) * 0.5
-    heat = np.round((21.0 + 0.2 * rng.standard_normal(1500)) / 0.0625) * 0.0625
-    lines = [
-        "temps (s);temperature;boite",
-        *(f"{a:.2f};{b:.4f};{20 + a / 300:.3f}" for a, b in zip(t, heat, strict=True)),
-    ]
-    (tmp_path / "heat.csv").write_text("\n".join(lines).replace(".", ","), encoding="utf-8")
-    return tmp_path / "heat.csv"
-
-
 def test_the_still_part_is_found_and_its_numbers_are_true(log):
     found = whole(log)
     start, stop = found["window"]
@@ -181,18 +168,6 @@ def test_a_column_without_stamps_needs_its_rate(tmp_path, rng):
     assert done.exit_code == 1
     assert "--rate HZ" in done.stderr
     assert whole(tmp_path / "v.csv", "--column", "volts=V", "--rate", 10)["duration"] == pytest.approx(49.9)
-
-
-def test_a_step(tmp_path, rng):
-    t = np.arange(600) * 0.01
-    x = 20 + 30 * -np.expm1(-np.maximum(t - 2.035, 0.0) / 0.12) + 0.2 * rng.standard_normal(600)
-    np.savetxt(tmp_path / "step.csv", np.column_stack([t, x]), delimiter=",", header="t,range", comments="")
-    found = whole(tmp_path / "step.csv", "--column", "range=cm", "--step", "--step-at", 2)["steps"]["range"]
-    assert found["latency"]["low"] < 0.035 < found["latency"]["high"]
-    assert found["time_constant"]["low"] < 0.12 < found["time_constant"]["high"]
-    done = run(tmp_path / "step.csv", "--column", "range=cm", "--step", "-o", tmp_path / "out")
-    assert done.exit_code == 0, done.stderr
-    assert (tmp_path / "out/report.html").read_text(encoding="utf-8").count("<svg") == 1
 
 
 def test_a_chosen_part(log):
