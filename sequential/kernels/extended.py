@@ -119,6 +119,9 @@ def filter_nodes(model, plan, belief, x, p, phi, iterations, work, update, expec
             logarithm, product = tallied(logarithm, product * share)
         copy_vector(x, out.mean[node])
         copy_matrix(p, out.cov[node])
+        for i in range(model.d):
+            if p[i, i] < 0.0:
+                return log_likelihood, -2 - node
     return log_likelihood - 0.5 * (logarithm + math.log(product)), -1
 
 
@@ -137,7 +140,10 @@ def workspace(n, d, widest):
     cache=True, error_model="numpy", nogil=True,
 )  # fmt: skip
 def filter_log(model, plan, prior_mean, prior_cov, iterations, keep, out, storage, tangent, reading):
-    """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite).
+    """Run the filter; returns (log likelihood, code).
+
+    The code is -1, or the reading at which S was not positive definite,
+    or -2 - k where a variance at node k was negative.
 
     The last three are the sizes of state, tangent and readings, as in `sequential.kernels.sizes`.
     """

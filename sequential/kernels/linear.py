@@ -51,12 +51,14 @@ def filter_nodes(model, plan, phi, d, m, driven, constant, scratch, keep, freeze
                 failed = reading
                 break
             log_likelihood += gained
+        lost = False
         for i in range(d):
             out.mean[node, i] = x[i]
+            lost = lost or p[i, i] < 0.0
             for j in range(d):
                 out.cov[node, i, j] = p[i, j]
-        if failed >= 0:
-            return log_likelihood, failed
+        if failed >= 0 or lost:
+            return log_likelihood, failed if failed >= 0 else -2 - node
         if same:
             size = known(m, model.z_dim[plan.sensor[plan.reading_ptr[node]]])
             settled = has_settled(
@@ -71,7 +73,10 @@ def filter_nodes(model, plan, phi, d, m, driven, constant, scratch, keep, freeze
     cache=True, error_model="numpy", nogil=True,
 )  # fmt: skip
 def filter_linear(model, plan, prior_mean, prior_cov, driven, constant, keep, freeze, out, state, reading):
-    """Run the filter; returns (log likelihood, -1 or the reading at which S was not positive definite).
+    """Run the filter; returns (log likelihood, code).
+
+    The code is -1, or the reading at which S was not positive definite,
+    or -2 - k where a variance at node k was negative.
 
     `driven` says whether an input drives the process, `constant` (S,) whether a sensor has no context; with
     `freeze` > 0 the gain is kept once P changes by less than that share of itself, see `kernels.frozen`;

@@ -6,7 +6,7 @@ from itertools import islice
 import exact
 import numpy as np
 import pytest
-from fuzz import fuzz, problems
+from fuzz import fuzz, problems, random_problem
 from worlds import times
 
 import sequential as sq
@@ -230,3 +230,11 @@ def test_perfect_readings_in_every_estimator():
     ):
         with pytest.raises(ModelError, match=r"sensor 'z' .*without noise.*; "):
             refusing.solve(problem)
+
+
+def test_a_variance_that_a_move_made_negative_is_found_where_no_reading_follows():
+    """One in a hundred thousand: nothing is read at that node, so no S could tell."""
+    problem = random_problem(85418)
+    for run in (sq.KalmanFilter().solve(problem), sq.ExtendedKalmanFilter().solve(problem)):
+        assert np.diagonal(run.cov, axis1=1, axis2=2).min() >= 0.0
+    assert "UD form" in sq.KalmanFilter().solve(problem).report.message
