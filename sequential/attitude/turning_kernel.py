@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numba import njit, types
 
+import sequential.kernels  # noqa: F401 - compiled code is kept where a digest of all of it says
+
 __all__ = [
     "f0",
     "f1",

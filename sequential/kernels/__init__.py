@@ -47,6 +47,8 @@ INLINED = (
     "kernels/unscented.py",
     "kernels/sigma_points.py",
 )
+# all of these: models, whose functions call one another, and the compiled loops outside this room
+ROOMS = ("models/*.py", "attitude/*.py", "sensors/*_kernel.py")
 
 
 def cache_folder() -> Path:
@@ -55,7 +57,8 @@ def cache_folder() -> Path:
         return Path(given)
     package = Path(__file__).parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in [*(package / name for name in INLINED), *sorted((package / "models").glob("*.py"))]:
+    rooms = [path for pattern in ROOMS for path in sorted(package.glob(pattern))]
+    for source in [*(package / name for name in INLINED), *rooms]:
         digest.update(source.read_bytes() if source.exists() else b"")
     base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
     for folder in (base, Path(tempfile.gettempdir())):

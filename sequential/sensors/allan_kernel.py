@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from numba import njit, types
 
+import sequential.kernels  # noqa: F401 - compiled code is kept where a digest of all of it says
+
 __all__ = ["lag_one", "second_differences", "summed_differences", "third_differences"]
 
 _f2 = types.Array(types.float64, 2, "C", readonly=True)
