@@ -84,6 +84,7 @@ class AttitudeChain:
         weight: Array | None = None,
         field: bool = True,
         covariance: bool = True,
+        hindsight: bool = True,
     ) -> ChainSolution:
         """Filter forwards, smooth backwards, about a solution or else about the filter's own estimate.
 
@@ -92,6 +93,7 @@ class AttitudeChain:
         weight : (K,) of the readings of the field
         field : use the magnetometer
         covariance : also of the smoothed states
+        hindsight : smooth; else each node is as the filter left it, which takes no trajectory to go around
         """
         from sequential.attitude.smoother_backward_kernel import backward
         from sequential.attitude.smoother_forward_kernel import forward
@@ -114,11 +116,12 @@ class AttitudeChain:
             self.nodes, self.rest, given, self.fresh, settings, start, prior, start_cov, field,
             around is not None, rotation, state, deviation, cov, gains, by_gyro, by_push, rows, trust,
         )  # fmt: skip
-        smoothed, end = np.zeros((count + 1, 6, 6)), np.zeros((SIZE, SIZE))
-        backward(
-            self.nodes, self.rest, settings, gains, by_gyro, by_push, rows, covariance, rotation, state,
-            deviation, cov, smoothed, end,
-        )  # fmt: skip
+        smoothed, end = cov[:, :6, :6].copy(), np.zeros((SIZE, SIZE))
+        if hindsight:
+            backward(
+                self.nodes, self.rest, settings, gains, by_gyro, by_push, rows, covariance, rotation, state,
+                deviation, cov, smoothed, end,
+            )  # fmt: skip
         return ChainSolution(rotation, state, smoothed, cov, end, given * trust if field else np.zeros(count))
 
     def beginning(self, rotation: Array, *, field: bool) -> Array:

@@ -28,6 +28,34 @@ def test_it_follows_perfect_sensors(world):
     assert np.degrees(attitude_error(history.heading_free, truth, heading_offset="mean").total) < 0.1
 
 
+def test_the_filter_of_its_model_knows_less_and_ends_where_the_first_smoothing_does(world):
+    t, truth = world
+    recording = seen(t, truth, rng=np.random.default_rng(5))
+    smoother = AttitudeSmoother(QUIET)
+    filtered, smoothed = smoother.filtered(recording), smoother.estimate(recording)
+    at = np.searchsorted(recording.t, filtered.t)
+    assert filtered.t[-1] == recording.t[-1]
+    error = np.degrees(attitude_error(filtered.world_q_body, truth[at]).total)
+    hindsight = np.degrees(attitude_error(smoothed.world_q_body[at], truth[at]).total)
+    assert hindsight < error < 3.0
+    late = slice(len(at) // 2, -10)
+    variance = np.trace(filtered.cov, axis1=1, axis2=2)[late]
+    assert (variance > np.trace(smoothed.cov[at], axis1=1, axis2=2)[late]).mean() > 0.9
+
+
+def test_on_a_real_trial_the_filter_is_worse_than_its_smoother_and_fair(data_dir):
+    (path,) = sorted((data_dir / "imu" / "broad").glob("16_*.npz"))
+    recording, truth = read_broad(path)
+    smoother = AttitudeSmoother()
+    filtered, smoothed = smoother.filtered(recording), smoother.estimate(recording)
+    at = np.searchsorted(recording.t, filtered.t)
+    errors = [
+        np.degrees(attitude_error(q, truth.world_q_body[at], truth.movement[at]).total)
+        for q in (filtered.world_q_body, smoothed.world_q_body[at])
+    ]
+    assert errors[1] < errors[0] < 2.0
+
+
 def test_without_magnetometer_the_heading_is_free(world):
     t, truth = world
     recording = seen(t, truth, mag=False, rng=np.random.default_rng(3))
