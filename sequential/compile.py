@@ -20,7 +20,6 @@ from sequential.errors import ModelError
 from sequential.fusing import fused_move, fused_sight, over_points
 from sequential.manifold import Kind, Manifold
 from sequential.model import Functions, Plain, StateSpace, evaluate
-from sequential.models.declared import density_noise
 from sequential.timeline import sealed
 from sequential.wrapping import wrapped
 
@@ -167,16 +166,14 @@ def _address(whole: Compiled, functions: Functions, raw: Any, name: str, sizes: 
 
 def _fused(whole: Compiled, fuse: Callable[..., Any], *given: Any) -> int:
     """Address of a function made of a user's functions, 0 where they do not lend themselves to it."""
-    raws = [raw for raw in given if callable(raw) or raw is None]
-    taken = [raw for raw in raws if isinstance(raw, Plain) and isinstance(raw.function, Hashable)]
-    if len(taken) < len(raws) - (density_noise in raws):
-        return 0
     try:
         made = fuse(*given)
     except Exception:  # noqa: BLE001 - where Numba refuses, each function is called by itself
         return 0
+    if made is None:
+        return 0
     whole.alive.append(made)
-    return int(made.address) if made is not None else 0
+    return int(made.address)
 
 
 @cache

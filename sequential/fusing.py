@@ -23,17 +23,17 @@ LENIENT = {"nnan", "nsz"}
 
 
 @lru_cache(maxsize=256)
-def fused_move(step: Plain, jacobian: Plain, noise: Any, n: int, d: int, inputs: int) -> Any:
+def fused_move(step: Any, jacobian: Any, noise: Any, n: int, d: int, inputs: int) -> Any:
     """`advance` of `sequential.model.Functions` from a step and its Jacobian; None where that cannot be.
 
     `noise` is a user's function or `density_noise`.
     """
     if d > LARGEST:
         return None
-    after = written(step, "after", n, n, inputs)
-    f = written(jacobian, "f", d * d, n, inputs)
+    after = written(step, "after", n, inputs)
+    f = written(jacobian, "f", n, inputs)
     if isinstance(noise, Plain):
-        q = written(noise, "q", d * d, n, inputs)
+        q = written(noise, "q", n, inputs)
     else:
         q = [f"p[{1 + k}] * dt" for k in range(d * d)] if noise is density_noise else None
     if after is None or f is None or q is None:
@@ -47,10 +47,10 @@ def fused_move(step: Plain, jacobian: Plain, noise: Any, n: int, d: int, inputs:
 
 
 @lru_cache(maxsize=256)
-def fused_sight(observe: Plain, jacobian: Plain, n: int, inputs: int) -> Any:
+def fused_sight(observe: Any, jacobian: Any, n: int, inputs: int) -> Any:
     """A function that writes the measurement and behind it its Jacobian; None where that cannot be."""
-    seen = written(observe, "seen", observe.size, n, inputs)
-    h = written(jacobian, "h", jacobian.size, n, inputs)
+    seen = written(observe, "seen", n, inputs)
+    h = written(jacobian, "h", n, inputs)
     if seen is None or h is None:
         return None
     lines = [f"seen = observe({given(observe)})", f"h = jacobian({given(jacobian)})"]
@@ -59,9 +59,9 @@ def fused_sight(observe: Plain, jacobian: Plain, n: int, inputs: int) -> Any:
 
 
 @lru_cache(maxsize=256)
-def over_points(raw: Plain, n: int, inputs: int, count: int, stride: int) -> Any:
+def over_points(raw: Any, n: int, inputs: int, count: int, stride: int) -> Any:
     """A function that takes `count` states at once, and writes each result `stride` numbers on."""
-    found = written(raw, "value", raw.size, n, inputs)
+    found = written(raw, "value", n, inputs)
     if found is None:
         return None
     lines = [f"for k in range({count}):", "    x = states[k]", f"    value = function({given(raw)})"]
@@ -69,13 +69,15 @@ def over_points(raw: Plain, n: int, inputs: int, count: int, stride: int) -> Any
     return made(lines, (count, n), inputs, {"function": raw})
 
 
-def written(raw: Plain, name: str, size: int, n: int, inputs: int) -> list[str] | None:
-    """Expressions of the numbers that a function returns; None unless it returns them as tuples."""
+def written(raw: Any, name: str, n: int, inputs: int) -> list[str] | None:
+    """Expressions of the numbers that a user's function returns; None unless it returns them as tuples."""
+    if not isinstance(raw, Plain):
+        return None
     value, writes = try_once(raw, n, inputs)
     if writes:
         return None
     found = places(value, name)
-    return found if type(value) is tuple and len(found) == size else None
+    return found if type(value) is tuple and len(found) == raw.size else None
 
 
 def given(raw: Plain) -> str:

@@ -47,8 +47,9 @@ INLINED = (
     "kernels/unscented.py",
     "kernels/sigma_points.py",
 )
-# all of these: models, whose functions call one another, and the compiled loops outside this room
-ROOMS = ("models/*.py", "attitude/*.py", "sensors/*_kernel.py")
+# all of these: models, whose functions call one another, and the compiled loops outside this room with the
+# constants that are compiled into them
+ROOMS = ("models/*.py", "attitude/*_kernel.py", "attitude/*_layout.py", "sensors/*_kernel.py")
 
 
 def cache_folder() -> Path:
