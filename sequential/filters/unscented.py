@@ -108,8 +108,8 @@ def filter_points(
     weights, unit = sealed(chosen.weights(d)), sealed(chosen.unit(d))
     sizes = sizes_of(whole.tables, "unscented", specialise=specialise)
     kernel = made_for(filter_sigma_points) if any(sizes) else filter_sigma_points
-    began = time.perf_counter()
     tables = whole.with_points(problem.model, 1 + (len(unit) or 2 * d), problem.schedule.z.shape[1])
+    began = time.perf_counter()
     log_likelihood, failed = kernel(
         tables, problem.schedule, prior.mean, prior.cov, weights, unit, int(keep), out,
         *sizes,
