@@ -8,6 +8,12 @@ BIN := $(VENV)/bin
 PIP_FLAGS := -qq --disable-pip-version-check --no-input
 EVERYTHING := .[test,cloud]
 BENCH_OUT := build/bench
+# Debian packages that tests ask for: a command, or a file where a package brings none, and the package
+PACKAGES := chromium gcc make \
+	arm-none-eabi-gcc:gcc-arm-none-eabi /usr/lib/arm-none-eabi/include/stdio.h:libnewlib-arm-none-eabi qemu-system-arm \
+	avr-gcc:gcc-avr /usr/lib/avr/include/avr/io.h:avr-libc simavr /usr/include/simavr/sim_avr.h:libsimavr-dev \
+	/usr/include/libelf.h:libelf-dev /usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h:arduino-core-avr \
+	cppcheck clang /usr/lib/llvm-*/lib/clang/*/include/fuzzer:libclang-rt-dev
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -16,7 +22,7 @@ pip_install = if [ -x $(BIN)/pip ]; then $(BIN)/python -m pip install $(PIP_FLAG
 	else $(PYTHON) -m pip --python $(BIN)/python install $(PIP_FLAGS) $(1); fi
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench warm clean
+.PHONY: help demo test packages check bench warm clean
 
 help:
 	@echo "make demo    install, then compare filters and smoothers on a real drive; ends with the report's path"
@@ -30,9 +36,11 @@ demo: $(VENV)/installed
 	@$(BIN)/python -m sequential.warm_up extended unscented iterated smoothing looking walking inertial position
 	@$(BIN)/factorlab demo
 
-test: $(VENV)/installed-test warm
-	@.ci/debian-packages chromium
+test: packages $(VENV)/installed-test warm
 	@$(ONE_THREAD) $(BIN)/python -m pytest -n 2 $(PYTEST_ARGS)
+
+packages:
+	@.ci/debian-packages $(PACKAGES)
 
 check: $(VENV)/installed-test
 	$(BIN)/ruff check
