@@ -86,6 +86,30 @@ def c_compiler() -> str:
     return found
 
 
+@pytest.fixture(scope="session")
+def firmware_dir() -> Path:
+    """The C sources of the firmware."""
+    return Path(__file__).resolve().parents[1] / "firmware"
+
+
+@pytest.fixture(scope="session")
+def arm_toolchain() -> str:
+    """The compiler for the Cortex-M4."""
+    found = shutil.which("arm-none-eabi-gcc")
+    if found is None:
+        pytest.skip("needs the compiler for ARM: install Debian's gcc-arm-none-eabi")
+    return found
+
+
+@pytest.fixture(scope="session")
+def qemu() -> str:
+    """The emulator of the Cortex-M4."""
+    found = shutil.which("qemu-system-arm")
+    if found is None:
+        pytest.skip("needs the emulator of ARM: install Debian's qemu-system-arm")
+    return found
+
+
 # --- no silent skips: where FACTORLAB_NO_SKIP is set, a skip is a failure that gives the skip's reason ---
 
 
