@@ -43,6 +43,7 @@ extern "C" {
 #define FRAME_MAG_DISTURBED 0x04U  /* the magnetometer was not used for this update */
 #define FRAME_SAMPLE_MISSING 0x08U /* the sensor gave no sample: raw counts are the last ones */
 #define FRAME_OVERRUN 0x10U        /* frames before this one were dropped: the line was too slow */
+#define FRAME_SATURATED 0x20U      /* a count of this sample stands at the end of its range */
 
 /* commands to the board, one byte each */
 #define COMMAND_QUATERNION 'q' /* send quaternion frames */

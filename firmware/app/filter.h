@@ -1,0 +1,33 @@
+/* The filter that an image was built with, behind one interface: filter_<name>.c for each, chosen by FILTER=<name>.
+ *
+ * Counts of the sensor are calibrated here, by the constants of FACTORLAB_CALIBRATION.
+ * What it does with bad input: see the header of the filter in core/; `periods` > 1 after periods without a sample.
+ */
+#ifndef FACTORLAB_FILTER_H
+#define FACTORLAB_FILTER_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+extern const uint8_t filter_kind;              /* BOOT_NO_FILTER ... of core/frame.h */
+extern const uint32_t filter_calibration_hash; /* first 4 bytes of the SHA-256 of its file, 0: none */
+
+/* Constants from settings; the attitude is the identity until the first sample. */
+void filter_start(void);
+
+/* One sample, `periods` after the one before; the first aligns the filter. */
+void filter_update(const int16_t counts[7] /* ax ay az temperature gx gy gz */, uint8_t periods);
+
+void filter_attitude(int32_t world_q_body[4] /* Q30 */);
+void filter_angles(int16_t roll_pitch_yaw[3] /* 65536 = 360 deg */);
+void filter_bias(int32_t bias[3] /* rad/s, Q24 */);
+uint8_t filter_status(void); /* FRAME_REST | FRAME_ACCEL_REJECTED */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* FACTORLAB_FILTER_H */
