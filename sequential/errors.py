@@ -12,9 +12,10 @@
     │   ├── NotPositiveDefiniteError
     │   ├── NonlinearModelError   an estimator cannot take this model
     │   └── JacobianMismatchError a declared Jacobian disagrees with differences
-    └── SolverError               the solve is at fault
-        ├── UnderConstrainedError the data leave some variable free
-        └── NotConvergedError
+    ├── SolverError               the solve is at fault
+    │   ├── UnderConstrainedError the data leave some variable free
+    │   └── NotConvergedError
+    └── ToolMissingError          a compiler or an emulator is not installed, or could not do its work
 
 A message is a sentence that says what was expected, what came, where, and what to do.
 """
@@ -36,6 +37,7 @@ __all__ = [
     "ShapeError",
     "SolverError",
     "TimeOrderError",
+    "ToolMissingError",
     "UnderConstrainedError",
 ]
 
@@ -98,3 +100,7 @@ class UnderConstrainedError(SolverError):
 
 class NotConvergedError(SolverError):
     """The iteration stopped before it settled."""
+
+
+class ToolMissingError(FactorlabError):
+    """A compiler or an emulator that the work needs is not installed, or could not do its work."""

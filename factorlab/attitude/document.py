@@ -71,7 +71,7 @@ def _verdicts(recording: ImuRecording, first: Solved) -> list[Verdict]:
         found.append(Verdict("error against the truth", total, None, "INFO", meaning, unit="°"))
     if first.share is not None:
         found.append(_honesty(first.share))
-    if first.name == "kalman":
+    if first.name in {"kalman", "c-kalman", "c-kalman-q"}:
         found += _steepness(float(np.degrees(np.abs(history.roll_pitch_yaw()[:, 1]).max())))
     if (sigmas := history.roll_pitch_yaw_sigmas()) is not None:
         tilt, yaw = np.degrees(np.median(sigmas[:, :2])), np.degrees(np.median(sigmas[:, 2]))

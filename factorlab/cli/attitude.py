@@ -18,13 +18,16 @@ if TYPE_CHECKING:
 
 __all__ = ["attitude"]
 
-FILTERS = ("error-state", "smoother", "mahony", "madgwick", "complementary", "kalman")
+FILTERS = (
+    "error-state", "smoother", "mahony", "madgwick", "complementary", "kalman", "c-error-state", "c-mahony",
+    "c-mahony-q", "c-complementary", "c-complementary-q", "c-kalman", "c-kalman-q",
+)  # fmt: skip
 
 
 @click.command(short_help="Orientation of an IMU, with its uncertainty.")
 @click.argument("source", metavar="LOG")
 @click.option("--filter", "name", type=click.Choice(FILTERS), help="Estimator.  [default: error-state]")
-@click.option("--compare", metavar="NAMES", help="Others beside it: mahony,madgwick … or all.")
+@click.option("--compare", metavar="NAMES", help="Others beside it: mahony,c-mahony … or all.")
 @click.option(
     "--calibration",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -58,6 +61,9 @@ def attitude(source: str, name: str | None, compare: str | None, **options: Any)
     With a magnetometer the answer is 9-D (north is magnetic), without 6-D (the heading counts from where it
     began).  Angles, uncertainty, gyro bias, rest and magnetic disturbance are drawn; where the recording has
     a truth (BROAD, RepoIMU, --truth), errors are told and the uncertainty is judged.
+
+    The filters whose names begin with c- are those of the firmware: the same C sources as on the board, in
+    single precision, or with -q in fixed point.
     """
     from factorlab.attitude import attitude_document, orientation_csv, orientation_tum, solve_attitude
     from factorlab.cli.delivery import deliver
@@ -90,10 +96,12 @@ def attitude(source: str, name: str | None, compare: str | None, **options: Any)
 
 def _names(name: str | None, compare: str | None) -> tuple[str, ...]:
     """The estimator asked for first, then those beside it, each once."""
-    from factorlab.attitude import DEFAULT, available
+    from factorlab.attitude import DEFAULT, available, left_out
 
     there = available()
     first = name or (DEFAULT if DEFAULT in there else there[0])
+    if compare == "all" and (lacking := left_out()):
+        click.echo(f"left out: {', '.join(lacking)}: {next(iter(lacking.values()))}", err=True)
     others = there if compare == "all" else tuple((compare or "").replace(" ", "").split(","))
     for other in filter(None, others):
         if other not in FILTERS:

@@ -29,6 +29,12 @@ LOOKS: dict[str, dict[str, Any]] = {
     "complementary": {"color": "#8A6D00", "linestyle": "--"},
     "kalman": {"color": "#56B4E9", "linestyle": "-."},
 }
+# the ports of the firmware have their models' colours
+LOOKS |= {
+    f"c-{name}{kind}": {"color": LOOKS[name]["color"], "linestyle": dashes}
+    for name in ("error-state", "mahony", "complementary", "kalman")
+    for kind, dashes in (("", (0, (1, 1))), ("-q", (0, (3, 1, 1, 1))))
+}
 TRUTH: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": (0, (4, 3)), "zorder": 5}
 AXES = ("x", "y", "z")
 AXIS_COLOURS = ("#D55E00", "#009E73", "#0072B2")

@@ -1,0 +1,90 @@
+"""The filters of the firmware as estimators: what the board computes, from the same C sources."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sequential.attitude.estimator import NO_FIELD, AttitudeFilter, own_state, sample
+from sequential.attitude.history import AttitudeHistory
+from sequential.firmware import calls
+from sequential.sensors.recording import ImuRecording
+
+__all__ = ["FirmwareFilter"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FirmwareFilter(AttitudeFilter):
+    """A filter of firmware/core, with the settings of the Python filter that it is the port of.
+
+    `design` holds the settings: tune the Python filter, then hand it over, as in
+    `CMahony(design=Mahony(gain=0.8))`.
+
+    Parameters
+    ----------
+    magnetometer : use it (9-D) or not (6-D); None where `design` says nothing and the recording has one
+
+    Raises
+    ------
+    ToolMissingError
+        by every call, where the C core is not compiled and cannot be; the message says what to install.
+    """
+
+    ENTRY: ClassVar[str] = ""
+    FIELDS: ClassVar[tuple[str, ...]] = ()
+    STATE: ClassVar[int] = 0
+    KNOWS: ClassVar[frozenset[str]] = frozenset()  # of gyro_bias, rest, magnetic_disturbance
+
+    def __post_init__(self) -> None:
+        if self.magnetometer is None:
+            object.__setattr__(self, "magnetometer", self.reference.magnetometer)
+
+    @property
+    @abc.abstractmethod
+    def reference(self) -> AttitudeFilter:
+        """The Python filter that this one is a port of, with the same settings."""
+
+    @property
+    def settings(self) -> Array:
+        """What the C struct of the settings holds, in its order."""
+        return np.array([float(getattr(self.reference, name)) for name in self.FIELDS])
+
+    def start(self, gyro: ArrayLike, accel: ArrayLike) -> Array:
+        """State from a first sample, in the layout of the Python filter."""
+        return calls.start(
+            self.ENTRY, self.settings, np.hstack(sample(gyro, accel, None)), self.STATE, self._rate(None)
+        )
+
+    def step(
+        self, state: ArrayLike, gyro: ArrayLike, accel: ArrayLike, mag: ArrayLike | None, dt: float
+    ) -> Array:
+        """Next state, dt seconds after the last sample, in the layout of the Python filter."""
+        own = own_state(state, self.STATE, type(self).__name__)
+        calls.step(self.ENTRY, self.settings, own, np.hstack(sample(gyro, accel, mag)), dt, self._rate(None))
+        return own
+
+    def estimate(self, recording: ImuRecording) -> AttitudeHistory:
+        """Orientation at every sample of a recording, and what else the filter knows."""
+        gyro, accel, mag = self.samples(recording)
+        field = None if mag is NO_FIELD else mag
+        found = calls.run(self.ENTRY, self.settings, recording.t, gyro, accel, field, self._rate(recording))
+        return AttitudeHistory(
+            recording.t,
+            found.world_q_body,
+            gyro_bias=found.bias if "gyro_bias" in self.KNOWS else None,
+            rest=found.rest if "rest" in self.KNOWS else None,
+            magnetic_disturbance=(
+                found.disturbed if "magnetic_disturbance" in self.KNOWS and field is not None else None
+            ),
+            name=self.name,
+        )
+
+    def _rate(self, recording: ImuRecording | None) -> float:
+        """Nominal rate, Hz; only fixed point counts in it."""
+        return 0.0
