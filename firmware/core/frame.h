@@ -32,8 +32,8 @@ extern "C" {
 #define FRAME_LARGEST 32U /* bytes: no frame is longer */
 
 /* types */
-#define FRAME_QUATERNION 1U /* world_q_body: i16 w x y z, Q14; gyro bias: i16 x y z, rad/s, Q15; status: u8 */
-#define FRAME_ANGLES 2U     /* i16 roll pitch yaw, 65536 = 360 deg; gyro bias: i16 x y z, rad/s, Q15; status */
+#define FRAME_QUATERNION 1U /* world_q_body: i16 w x y z, Q14; bias: i16 x y z, rad/s, Q15; status: u8 */
+#define FRAME_ANGLES 2U     /* i16 roll pitch yaw, 65536 = 360 deg; bias: i16 x y z, rad/s, Q15; status */
 #define FRAME_RAW 3U        /* i16 ax ay az temperature gx gy gz, counts of an MPU-6050; status: u8 */
 #define FRAME_BOOT 4U       /* struct boot_facts, in its order */
 
