@@ -102,6 +102,24 @@ def arm_toolchain() -> str:
 
 
 @pytest.fixture(scope="session")
+def avr_toolchain() -> str:
+    """The compiler for the ATmega328P."""
+    found = shutil.which("avr-gcc")
+    if found is None:
+        pytest.skip("needs the compiler for AVR: install Debian's gcc-avr and avr-libc")
+    return found
+
+
+@pytest.fixture(scope="session")
+def simavr() -> str:
+    """The emulator of the ATmega328P."""
+    found = shutil.which("simavr")
+    if found is None:
+        pytest.skip("needs the emulator of AVR: install Debian's simavr")
+    return found
+
+
+@pytest.fixture(scope="session")
 def qemu() -> str:
     """The emulator of the Cortex-M4."""
     found = shutil.which("qemu-system-arm")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factorlab.cli.delivery import header_option, require_output
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.recording import opened, recording_options
 from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
@@ -28,7 +29,8 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
         metavar="DIR",
         help="Write the report, calibration.json and calibration.h here.",
     ),
-    click.option("--force", is_flag=True, help="Write over an earlier report in DIR."),
+    header_option,
+    click.option("--force", is_flag=True, help="Write over an earlier report in DIR, or over FILE.h."),
     check_option,
     config_option,
 )
@@ -180,10 +182,7 @@ def ferraris(source: str, **options: Any) -> int:
 
 
 def _require_free(options: dict[str, Any]) -> None:
-    if options["out"] is not None:
-        from factorlab.report.folder import require_free
-
-        require_free(options["out"], force=options["force"])
+    require_output(options["out"], options["c_header"], force=options["force"])
 
 
 def _recording(source: str, options: dict[str, Any]) -> ImuRecording:
@@ -212,5 +211,5 @@ def _imu_files(bundle: ImuCalibration, recording: ImuRecording, command: str) ->
 def _deliver(document: Document, options: dict[str, Any], files: dict[str, str]) -> int:
     from factorlab.cli.delivery import deliver
 
-    chosen = {name: options[name] for name in ("as_json", "out", "force", "check")}
+    chosen = {name: options[name] for name in ("as_json", "out", "force", "check", "c_header")}
     return deliver(document, files=files, **chosen)

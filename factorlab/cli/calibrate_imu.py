@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factorlab.cli.delivery import header_option, require_output
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.recording import opened, recording_options
 from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
@@ -36,7 +37,8 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
     as_json,
     click.option("-o", "--out", type=click.Path(path_type=Path), metavar="DIR",
                  help="Write the report, calibration.json, calibration.h and kalibr_imu.yaml here."),
-    click.option("--force", is_flag=True, help="Write over an earlier report in DIR."),
+    header_option,
+    click.option("--force", is_flag=True, help="Write over an earlier report in DIR, or over FILE.h."),
     check_option,
     config_option,
 )  # fmt: skip
@@ -143,10 +145,7 @@ def _detector(options: dict[str, Any]) -> StillDetector:
 
 
 def _logs(options: dict[str, Any]) -> list[ImuRecording]:
-    if options["out"] is not None:
-        from factorlab.report.folder import require_free
-
-        require_free(options["out"], force=options["force"])
+    require_output(options["out"], options["c_header"], force=options["force"])
     return [_read(source, options) for source in options["sources"]]
 
 
@@ -170,4 +169,5 @@ def _deliver(done: Calibrated, what: str, options: dict[str, Any]) -> int:
         force=options["force"],
         check=options["check"],
         files=export_files(done, command),
+        c_header=options["c_header"],
     )

@@ -10,7 +10,8 @@
 
 from sequential.sensors.allan import AllanDeviation, allan_deviation
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
-from sequential.sensors.calibration_files import c_header, kalibr_yaml
+from sequential.sensors.calibration_files import kalibr_yaml
+from sequential.sensors.calibration_header import c_header, calibration_hash, nominal_calibration
 from sequential.sensors.characterize import Characteristics, characterize
 from sequential.sensors.characterize_step import StepResponse, step_response
 from sequential.sensors.dwells import Dwells, find_dwells, join_recordings
@@ -76,6 +77,7 @@ __all__ = [
     "best_next_direction",
     "bias_at_rest",
     "c_header",
+    "calibration_hash",
     "characterize",
     "constant_rate",
     "find_dwells",
@@ -85,6 +87,7 @@ __all__ = [
     "kalibr_yaml",
     "local_gravity",
     "missing_positions",
+    "nominal_calibration",
     "simulate_imu",
     "stationary",
     "step_response",

@@ -2,96 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import DataError
-from sequential.sensors.calibration import AffineCalibration, ImuCalibration
+from sequential.sensors.calibration import ImuCalibration
+from sequential.sensors.calibration_header import c_header
 
 __all__ = ["c_header", "kalibr_yaml"]
 
 Array = NDArray[np.float64]
-
-
-def c_header(
-    calibrations: ImuCalibration | Sequence[AffineCalibration],
-    *,
-    source: str = "",
-    guard: str = "FACTORLAB_IMU_CALIBRATION_H",
-) -> str:
-    """Constants of single precision for the firmware, C99: one struct a sensor, units at every field.
-
-    Parameters
-    ----------
-    calibrations : the sensors, at most one of each kind
-    source : the recording and the command, for the comment at the head
-    guard : name of the include guard
-
-    Raises
-    ------
-    DataError
-        where there is nothing to write, two sensors of one kind, or a number that a float cannot hold.
-    """
-    sensors = calibrations.present if isinstance(calibrations, ImuCalibration) else tuple(calibrations)
-    kinds = [one.kind for one in sensors]
-    if not kinds or len(set(kinds)) < len(kinds):
-        raise DataError(f"a C header takes one calibration a sensor, got {', '.join(kinds) or 'none'}")
-    source = source or "; ".join(dict.fromkeys(one.source for one in sensors if one.source)) or "not stated"
-    head = [
-        "/* Calibration of an inertial sensor: calibrated = matrix * (raw - offset).",
-        f" * Source: {_commentable(source)}",
-        " */",
-        f"#ifndef {guard}",
-        f"#define {guard}",
-        "",
-    ]
-    return "\n".join(
-        [*head, *(line for one in sensors for line in _struct(one)), f"#endif /* {guard} */", ""]
-    )
-
-
-def _struct(one: AffineCalibration) -> list[str]:
-    name = f"{one.kind}_calibration"
-    rows = [", ".join(_float(value) for value in row) for row in one.matrix]
-    unit_in, unit_out = _commentable(one.unit_in), _commentable(one.unit_out)
-    matrix = ",\n".join(f"        {{{row}}}" for row in rows)
-    return [
-        f"struct {name}_f32 {{",
-        f"    float matrix[3][3]; /* {unit_out} per {unit_in} */",
-        f"    float offset[3];    /* {unit_in} */",
-        "};",
-        f"static const struct {name}_f32 {name} = {{",
-        f"    .matrix = {{\n{matrix}}},",
-        f"    .offset = {{{', '.join(_float(value) for value in one.offset)}}},",
-        "};",
-        "",
-    ]
-
-
-def _felt(matrix: Array, unit: str) -> list[str]:
-    rows = ",\n".join(f"    {{{', '.join(_float(value) for value in row)}}}" for row in matrix)
-    return [
-        "/* What the gyro reads of gravity: first take off gyro_g_sensitivity * calibrated accelerometer. */",
-        f"/* {_commentable(unit)} per m/s^2 */",
-        f"static const float gyro_g_sensitivity[3][3] = {{\n{rows}}};",
-        "",
-    ]
-
-
-def _float(value: float) -> str:
-    """Nine digits carry a float there and back."""
-    if abs(value) > np.finfo(np.float32).max:
-        raise DataError(f"{value:g} is more than a float can hold; give the raw readings another unit")
-    digits = f"{float(np.float32(value)):.9g}"
-    return f"{digits if set('.en') & set(digits) else digits + '.0'}f"
-
-
-def _commentable(text: str) -> str:
-    """One line that cannot end the comment it stands in."""
-    return " ".join(text.split()).replace("*/", "* /")
 
 
 def kalibr_yaml(calibration: ImuCalibration, *, rate: float | None = None) -> str:

@@ -12,7 +12,7 @@ from dwell_worlds import ACCEL_MATRIX, ACCEL_OFFSET, GYRO_MATRIX, attitudes, rec
 
 from factorlab.cli import main
 from sequential.readers import write_imu
-from sequential.sensors import SIX_POSITIONS, ImuCalibration, ImuRecording
+from sequential.sensors import SIX_POSITIONS, ImuCalibration, ImuRecording, calibration_hash
 
 
 def run(*arguments):
@@ -50,7 +50,9 @@ def test_imu_with_report_files_and_a_trial(folder, tmp_path):
     np.testing.assert_allclose(bundle.accel.matrix, ACCEL_MATRIX, atol=2e-3)
     np.testing.assert_allclose(bundle.accel.offset, ACCEL_OFFSET, atol=1e-2)
     np.testing.assert_allclose(bundle.gyro.matrix, GYRO_MATRIX, atol=2e-3)
-    assert "accel_calibration" in (out / "calibration.h").read_text()
+    header = (out / "calibration.h").read_text()
+    assert f"HASH 0x{calibration_hash(bundle):08x}UL" in header
+    assert "affine_q accel_calibration_q" in header
     assert yaml.safe_load((out / "kalibr_imu.yaml").read_text())["imu0"]["model"] == "scale-misalignment"
     page = (out / "report.html").read_text()
     assert page.count("<svg") == 6
@@ -58,6 +60,21 @@ def test_imu_with_report_files_and_a_trial(folder, tmp_path):
     again = run("imu", folder / "many.csv", "-o", out)
     assert again.exit_code == 1
     assert "--force" in again.stderr
+
+
+def test_a_header_for_the_firmware_alone(folder, tmp_path):
+    header = tmp_path / "constants.h"
+    done = run("gyro", folder / "rest.csv", "--c-header", header, "--json")
+    assert done.exit_code == 0, done.stderr
+    json.loads(done.stdout)
+    assert "affine_q gyro_calibration_q" in header.read_text()
+    again = run("gyro", folder / "rest.csv", "--c-header", header)
+    assert again.exit_code == 1
+    assert "--force" in again.stderr
+    assert run("gyro", folder / "rest.csv", "--c-header", header, "--force").exit_code == 0
+    lost = run("gyro", folder / "rest.csv", "--c-header", tmp_path / "no" / "c.h")
+    assert lost.exit_code == 1
+    assert "there is no folder" in lost.stderr
 
 
 def test_the_same_numbers_on_the_screen(folder):

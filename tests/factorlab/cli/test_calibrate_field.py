@@ -69,7 +69,8 @@ def test_json_is_one_document(turns, table):
 
 def test_range_finds_curve_fold_and_useful_range(table, tmp_path):
     out = tmp_path / "out"
-    done = run("range", table, "--limit", "0.5", "--verify", table, "-o", out, "--json")
+    apart = tmp_path / "range.h"
+    done = run("range", table, "--limit", "0.5", "--verify", table, "-o", out, "--json", "--c-header", apart)
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     constants = found["constants"]
@@ -80,6 +81,7 @@ def test_range_finds_curve_fold_and_useful_range(table, tmp_path):
     assert found["verification"]["rms"] < 2 * found["verification"]["expected"]
     header = (out / "calibration.h").read_text()
     assert "static const float range_a" in header
+    assert apart.read_text() == header
     assert json.loads((out / "calibration.json").read_text())["model"] == "v = a / (d + b) + c"
 
 

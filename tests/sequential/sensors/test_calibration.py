@@ -119,14 +119,15 @@ def test_a_bundle_calibrates_a_recording(rng):
 def test_c_header_compiles_and_calibrates(rng, tmp_path, c_compiler):
     imu = ImuCalibration(some(rng), some(rng, "gyro"), some(rng, "mag"))
     text = c_header(imu, source="a */ trap\nof two lines")
-    assert text.count("struct") == 6
-    assert "m/s^2 per counts" in text
+    assert text.count("static const struct affine_f32") == 3
+    assert "m/s^2 from counts" in text
     (tmp_path / "calibration.h").write_text(text)
     (tmp_path / "t.c").write_text(
         '#include "calibration.h"\n#include "calibration.h"\n#include <stdio.h>\nint main(void) {\n'
         "for (int i = 0; i < 3; i++) { float y = 0.0f; for (int j = 0; j < 3; j++)\n"
-        "y += gyro_calibration.matrix[i][j] * ((float)(j + 5) - gyro_calibration.offset[j]);\n"
-        'printf("%.9g\\n", (double)y + 0.0 * (accel_calibration.offset[0] + mag_calibration.offset[0])); }\n'
+        "y += gyro_calibration_f32.matrix[i][j] * ((float)(j + 5) - gyro_calibration_f32.offset[j]);\n"
+        "y += 0.0f * (accel_calibration_f32.offset[0] + mag_calibration_f32.offset[0]);\n"
+        'printf("%.9g\\n", (double)y); }\n'
         "return 0; }\n"
     )
     subprocess.run(
@@ -142,7 +143,7 @@ def test_c_header_compiles_and_calibrates(rng, tmp_path, c_compiler):
 
 def test_c_header_refuses_what_a_float_cannot_hold(rng):
     with pytest.raises(DataError, match="float can hold"):
-        c_header([AffineCalibration(np.eye(3) * 1e39, np.zeros(3))])
+        c_header([AffineCalibration(np.eye(3) * 1e42, np.zeros(3))])
     with pytest.raises(DataError, match="one calibration a sensor"):
         c_header([some(rng), some(rng)])
     with pytest.raises(DataError, match="none"):
