@@ -14,12 +14,11 @@
 
 struct app {
     struct mpu6050 sensor;
-    int16_t counts[MPU6050_COUNTS]; /* of the last sample: ax ay az temperature gx gy gz */
-    uint16_t sequence;              /* number of the next frame */
-    uint8_t mode;                   /* COMMAND_QUATERNION, COMMAND_ANGLES, COMMAND_RAW, COMMAND_TEXT */
-    uint8_t due;                    /* 1: this period has not had its frame yet */
-    uint8_t periods;                /* since the last sample, at most 255 */
-    uint8_t overrun;                /* FRAME_OVERRUN: a frame was dropped since one was sent */
+    uint16_t sequence; /* number of the next frame */
+    uint8_t mode;      /* COMMAND_QUATERNION, COMMAND_ANGLES, COMMAND_RAW, COMMAND_TEXT */
+    uint8_t due;       /* 1: this period has not had its frame yet */
+    uint8_t periods;   /* since the last sample, at most 255 */
+    uint8_t overrun;   /* FRAME_OVERRUN: a frame was dropped since one was sent */
 };
 
 static struct app app;
@@ -82,7 +81,7 @@ static void send_raw(uint8_t status)
 {
     uint8_t frame[FRAME_LARGEST];
     send_first(FRAME_START);
-    send_rest(frame, frame_raw(frame, app.sequence, board_time_us(), app.counts, status));
+    send_rest(frame, frame_raw(frame, app.sequence, board_time_us(), app.sensor.counts, status));
 }
 
 /* The one frame of this period. */
@@ -160,7 +159,7 @@ static void take(uint8_t answer)
         return;
     }
     board_mark_update(1);
-    filter_update(app.counts, app.periods);
+    filter_update(app.sensor.counts, app.periods);
     board_mark_update(0);
     app.periods = 0;
     report((uint8_t)(filter_status() | (answer == MPU6050_SATURATED ? FRAME_SATURATED : 0U)));
@@ -168,10 +167,11 @@ static void take(uint8_t answer)
 
 static void tick(void)
 {
-    uint8_t periods = board_periods();
-    if (app.due != 0U) { /* the transfer of the last period never ended */
+    uint8_t periods;
+    if (app.due != 0U) { /* the transfer of the last period never ended: its frame, with its time */
         report((uint8_t)(filter_status() | FRAME_SAMPLE_MISSING));
     }
+    periods = board_periods();
     app.sequence = (uint16_t)(app.sequence + periods - 1U);
     app.periods = (uint8_t)(periods > UINT8_MAX - app.periods ? UINT8_MAX : app.periods + periods);
     app.due = 1;
@@ -189,7 +189,7 @@ void app_start(void)
 void app_step(uint8_t events)
 {
     if ((events & BOARD_I2C) != 0U) { /* first: with a tick beside it, it belongs to the period before */
-        take(mpu6050_transferred(&app.sensor, app.counts));
+        take(mpu6050_transferred(&app.sensor));
     }
     if ((events & BOARD_TICK) != 0U) {
         tick();

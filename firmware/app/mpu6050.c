@@ -107,32 +107,40 @@ static void advance(struct mpu6050 *sensor)
     sensor->step++;
 }
 
-/* Whether the sensor still says something new; one that does not is started anew, again every few seconds. */
-static uint8_t is_alive(struct mpu6050 *sensor)
+/* A sensor that says the same again and again is started anew, every few seconds. */
+static uint8_t repeated(struct mpu6050 *sensor)
 {
-    if (memcmp(sensor->bytes, sensor->previous, MPU6050_BURST) != 0) {
-        (void)memcpy(sensor->previous, sensor->bytes, MPU6050_BURST);
-        sensor->equal = 0;
-        return 1;
-    }
     sensor->equal++;
     if (sensor->equal == MPU6050_STUCK || sensor->equal == UINT8_MAX) {
         restart(sensor, RESET);
         sensor->equal = MPU6050_STUCK;
     }
-    return sensor->equal < MPU6050_STUCK;
+    return sensor->equal < MPU6050_STUCK ? MPU6050_SAMPLE : MPU6050_NOTHING;
 }
 
-static uint8_t counts_of(const uint8_t bytes[MPU6050_BURST], int16_t counts[MPU6050_COUNTS])
+/* One pass over the bytes: this is the time between a sample in memory and its update. */
+static uint8_t sample(struct mpu6050 *sensor)
 {
-    uint8_t saturated = 0;
+    const uint8_t *bytes = sensor->bytes;
+    int16_t *counts = sensor->counts;
+    uint8_t changed = 0, answer = MPU6050_SAMPLE;
     for (uint8_t k = 0; k < MPU6050_COUNTS; k++) {
-        counts[k] = (int16_t)(uint16_t)(((uint16_t)bytes[2U * k] << 8) | bytes[2U * k + 1U]);
-        if (counts[k] == INT16_MAX || counts[k] == INT16_MIN) {
-            saturated = 1;
+        int16_t count = (int16_t)(uint16_t)(((uint16_t)bytes[0] << 8) | bytes[1]);
+        if (count != *counts) {
+            changed = 1;
+            *counts = count;
         }
+        if (count == INT16_MAX || count == INT16_MIN) {
+            answer = MPU6050_SATURATED;
+        }
+        bytes += 2;
+        counts++;
     }
-    return saturated;
+    if (changed == 0U) {
+        return repeated(sensor);
+    }
+    sensor->equal = 0;
+    return answer;
 }
 
 static uint8_t failed(struct mpu6050 *sensor, uint8_t state)
@@ -148,7 +156,7 @@ static uint8_t failed(struct mpu6050 *sensor, uint8_t state)
     return MPU6050_NOTHING;
 }
 
-uint8_t mpu6050_transferred(struct mpu6050 *sensor, int16_t counts[MPU6050_COUNTS])
+uint8_t mpu6050_transferred(struct mpu6050 *sensor)
 {
     uint8_t state = board_i2c_state();
     if (state != BOARD_I2C_DONE) {
@@ -159,8 +167,5 @@ uint8_t mpu6050_transferred(struct mpu6050 *sensor, int16_t counts[MPU6050_COUNT
         advance(sensor);
         return MPU6050_NOTHING;
     }
-    if (is_alive(sensor) == 0U) {
-        return MPU6050_NOTHING;
-    }
-    return counts_of(sensor->bytes, counts) != 0U ? MPU6050_SATURATED : MPU6050_SAMPLE;
+    return sample(sensor);
 }

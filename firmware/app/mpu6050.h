@@ -41,19 +41,19 @@ extern "C" {
 
 /* What a call tells. */
 #define MPU6050_PENDING 0U   /* a transfer is under way: ask again when it has ended */
-#define MPU6050_SAMPLE 1U    /* `counts` holds the sample of this period */
+#define MPU6050_SAMPLE 1U    /* `counts` of the sensor is the sample of this period */
 #define MPU6050_SATURATED 2U /* the same, and one of its counts stands at the end of the range */
 #define MPU6050_NOTHING 3U   /* this period will have no sample */
 
 struct mpu6050 {
-    uint8_t step;                    /* of the start, or reading */
-    uint8_t wait;                    /* periods until the next step */
-    uint8_t failures;                /* periods without an answer, in a row */
-    uint8_t equal;                   /* samples equal to the one before, in a row */
-    uint8_t identity;                /* last WHO_AM_I read, 0: none */
-    uint8_t command[5];              /* bytes being written */
-    uint8_t bytes[MPU6050_BURST];    /* bytes being read, big endian */
-    uint8_t previous[MPU6050_BURST]; /* the sample before */
+    uint8_t step;                   /* of the start, or reading */
+    uint8_t wait;                   /* periods until the next step */
+    uint8_t failures;               /* periods without an answer, in a row */
+    uint8_t equal;                  /* samples equal to the one before, in a row */
+    uint8_t identity;               /* last WHO_AM_I read, 0: none */
+    uint8_t command[5];             /* bytes being written */
+    uint8_t bytes[MPU6050_BURST];   /* bytes being read, big endian */
+    int16_t counts[MPU6050_COUNTS]; /* the last sample: ax ay az temperature gx gy gz */
 };
 
 void mpu6050_start(struct mpu6050 *sensor);
@@ -62,7 +62,7 @@ void mpu6050_start(struct mpu6050 *sensor);
 uint8_t mpu6050_tick(struct mpu6050 *sensor);
 
 /* To be called when a transfer has ended. */
-uint8_t mpu6050_transferred(struct mpu6050 *sensor, int16_t counts[MPU6050_COUNTS]);
+uint8_t mpu6050_transferred(struct mpu6050 *sensor);
 
 #ifdef __cplusplus
 }

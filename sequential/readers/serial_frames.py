@@ -59,6 +59,7 @@ class Status(IntFlag):
     MAG_DISTURBED = 4
     SAMPLE_MISSING = 8
     OVERRUN = 16
+    SATURATED = 32
 
 
 @dataclass(frozen=True, slots=True)

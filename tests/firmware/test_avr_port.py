@@ -1,0 +1,165 @@
+"""The board of an ATmega328P: bus, driver, clock and serial line, on a sensor that we invent."""
+
+import numpy as np
+import pytest
+
+from factorlab.firmware.avr import ABSENT, GOOD, HUNG, emulate_avr
+from sequential.errors import DataError, ShapeError, ToolMissingError
+from sequential.readers.serial import Status
+
+MISSING, OVERRUN, SATURATED = Status.SAMPLE_MISSING, Status.OVERRUN, Status.SATURATED
+STUCK = 25  # MPU6050_STUCK
+
+
+@pytest.fixture
+def counts(rng):
+    """Noise on every axis, like a sensor that is moved."""
+    return rng.integers(-20_000, 20_000, (600, 7))
+
+
+@pytest.fixture
+def recorder(avr_image, avr_simulator):
+    """The image without a filter, which sends what the sensor says."""
+    image = avr_image(FILTER="none")
+
+    def run(counts, **options):
+        return emulate_avr(image, counts, **({"mode": "r"} | options), simulator=avr_simulator)
+
+    return run
+
+
+def received(emulation):
+    return np.array([frame.counts for frame in emulation.frames])
+
+
+def test_every_sample_arrives_in_a_frame_of_its_own(recorder, counts):
+    emulation = recorder(counts)
+    assert emulation.lost == emulation.corrupt == 0
+    assert not emulation.missing.any()
+    np.testing.assert_array_equal(received(emulation), counts)
+    sequence = np.array([frame.sequence for frame in emulation.frames])
+    assert (np.diff(sequence) == 1).all()
+    stamps = np.array([frame.t_us for frame in emulation.frames])
+    assert (np.diff(stamps) == 10_000).all()
+
+
+def test_board_says_what_it_is(recorder, counts):
+    boot = recorder(counts[:3]).boot
+    assert (boot.target, boot.filter, boot.sensor) == ("atmega328p", "none", "MPU-6050")
+    assert (boot.rate, boot.gyro_range, boot.accel_range) == (100, 2000, 8)
+    assert boot.calibration_hash == 0
+
+
+@pytest.mark.parametrize("mode", ["q", "a", "r", "t"])
+def test_frames_leave_at_the_phase_whatever_is_sent(recorder, counts, mode):
+    emulation = recorder(counts, mode=mode)
+    assert emulation.lost == 0
+    assert np.abs(emulation.jitter[2:]).max() <= 2e-6
+    assert (emulation.latency[2:] > 0).all()
+
+
+def test_processor_sleeps_when_it_has_nothing_to_do(recorder, counts):
+    emulation = recorder(counts)
+    assert emulation.asleep > 0.95
+    # bursts of 17 bytes, frames of 26: interrupts and arithmetic together are far from 5 % of a period
+    assert emulation.stack < 200
+
+
+def test_bus_runs_at_400_kilohertz(recorder, counts):
+    emulation = recorder(counts)
+    latency = emulation.latency[2:]
+    assert np.ptp(latency) < 2e-6
+    # the phase is 700 us after the tick; 17 bytes of nine bits take 383 us, interrupts between them the rest
+    burst = 700e-6 - latency.mean()
+    assert 400e-6 < burst < 560e-6
+
+
+def test_period_without_an_answer_is_a_missing_sample(recorder, counts, rng):
+    absent = rng.random(len(counts)) < 0.2
+    absent[:3] = False
+    emulation = recorder(counts, faults=np.where(absent, ABSENT, GOOD))
+    assert emulation.lost == 0
+    longest = max(len(run) for run in "".join("x" if a else " " for a in absent).split())
+    assert longest < 10  # otherwise the sensor would be started anew
+    np.testing.assert_array_equal(emulation.missing, absent)
+    np.testing.assert_array_equal(received(emulation)[~absent], counts[~absent])
+    assert np.isnan(emulation.update_cycles[absent]).all()
+
+
+def test_sensor_that_was_unplugged_is_started_anew(recorder, counts):
+    faults = np.full(len(counts), GOOD)
+    faults[100:200] = ABSENT
+    emulation = recorder(counts, faults=faults)
+    assert emulation.lost == 0
+    assert not emulation.missing[:100].any()
+    assert emulation.missing[100:200].all()
+    back = int(np.flatnonzero(~emulation.missing[200:])[0])
+    assert back < 40  # a try each 110 ms, 100 ms of reset, 40 ms of start
+    np.testing.assert_array_equal(received(emulation)[200 + back :], counts[200 + back :])
+
+
+def test_bus_that_hangs_is_freed(recorder, counts):
+    faults = np.full(len(counts), GOOD)
+    faults[[100, 300]] = HUNG
+    emulation = recorder(counts, faults=faults)
+    assert emulation.lost == 0
+    for hung in (100, 300):
+        assert emulation.missing[hung]
+        back = int(np.flatnonzero(~emulation.missing[hung:])[0])
+        assert back < 60  # nine clocks of a period for each half, then the start of the sensor
+    good = ~emulation.missing
+    np.testing.assert_array_equal(received(emulation)[good], counts[good])
+
+
+def test_another_sensor_is_not_read(recorder, counts):
+    emulation = recorder(counts[:100], who_am_i=0x71)
+    assert np.isnan(emulation.sample_s).all()
+    assert emulation.lost == 0
+    assert emulation.missing.all()
+
+
+def test_samples_that_never_change_are_no_samples(recorder, counts):
+    counts[100:300] = counts[100]
+    emulation = recorder(counts)
+    assert emulation.lost == 0
+    assert not emulation.missing[: 100 + STUCK].any()
+    assert emulation.missing[100 + STUCK : 300].all()
+    back = int(np.flatnonzero(~emulation.missing[300:])[0])
+    assert back < 40
+    assert not emulation.missing[300 + back :].any()
+
+
+def test_counts_at_the_end_of_the_range_are_marked(recorder, counts):
+    counts[50, 0], counts[60, 5] = 32767, -32768
+    marked = recorder(counts).has(SATURATED)
+    assert np.flatnonzero(marked).tolist() == [50, 60]
+
+
+def test_slow_line_loses_whole_frames_and_says_so(avr_image, avr_simulator, counts):
+    image = avr_image(FILTER="none", BAUD="9600")
+    emulation = emulate_avr(image, counts, mode="r", simulator=avr_simulator)
+    assert emulation.corrupt == 0
+    # 26 bytes take 27 ms
+    assert 0.55 < emulation.lost / len(counts) < 0.75
+    came = [k for k, frame in enumerate(emulation.frames) if frame is not None]
+    sequence = np.array([emulation.frames[k].sequence for k in came])
+    np.testing.assert_array_equal(np.diff(sequence), np.diff(came))
+    after_loss = np.flatnonzero(np.diff(came) > 1) + 1
+    assert all(OVERRUN in emulation.frames[came[k]].status for k in after_loss)
+    np.testing.assert_array_equal([emulation.frames[k].counts for k in came], counts[came])
+
+
+def test_baud_that_the_clock_cannot_give_is_refused(avr_image):
+    with pytest.raises(ToolMissingError, match="cannot be had"):
+        avr_image(FILTER="none", BAUD="300000")
+
+
+def test_what_is_no_sample_is_refused(recorder, counts):
+    with pytest.raises(ShapeError, match=r"\(N, 7\)"):
+        recorder(counts[:, :6])
+    with pytest.raises(DataError, match="16 bits"):
+        recorder(counts * 10)
+    with pytest.raises(DataError, match="mode 'x'"):
+        recorder(counts, mode="x")
+    with pytest.raises(ShapeError, match="faults"):
+        recorder(counts, faults=[0, 1])
