@@ -51,6 +51,17 @@ static inline int32_t mul32_c(int32_t a, int32_t b) { return (int32_t)(((int64_t
 #define mul32_q mul32_c
 #endif
 
+/* a + b, a - b, a 2^n modulo 2^32: for what stays in range unless a caller's state makes no sense. */
+static inline int32_t plus_q(int32_t a, int32_t b) { return (int32_t)((uint32_t)a + (uint32_t)b); }
+static inline int32_t minus_q(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
+static inline int32_t up_q(int32_t a, uint8_t n) { return (int32_t)((uint32_t)a << n); }
+
+/* Whether |x| <= limit, 0 <= limit < 2^30. */
+static inline uint8_t within_q(int32_t x, int32_t limit)
+{
+    return (uint32_t)x + (uint32_t)limit <= 2U * (uint32_t)limit;
+}
+
 /* a + b, saturated. */
 static inline int32_t add_q(int32_t a, int32_t b)
 {
@@ -79,16 +90,16 @@ static inline int16_t narrow_q(int32_t x)
     return x < INT16_MIN ? INT16_MIN : (int16_t)x;
 }
 
-/* x / 2^16, rounded; x < 2^31 - 2^15. */
-static inline int16_t high16_q(int32_t x) { return (int16_t)((x + 0x8000) >> 16); }
+/* x / 2^16, rounded; modulo 2^16 from 2^31 - 2^15 on. */
+static inline int16_t high16_q(int32_t x) { return (int16_t)(plus_q(x, 0x8000) >> 16); }
 
 /* |x|, which fits: x > -2^31. */
 static inline int32_t abs_q(int32_t x) { return x < 0 ? -x : x; }
 
-/* 2^31 / sqrt(x) for 2^30 <= x < 2^32: never too large, too small by less than 1 part in 1 900. */
+/* 2^31 / sqrt(x) for 2^30 <= x < 2^32: too small by 1 part in 1 800 to 28 000. */
 uint16_t inverse_sqrt_q(uint32_t x);
 
-/* sqrt(x): never too large, too small by less than 1 part in 1 800 and 1. */
+/* sqrt(x): too small by at most 1 part in 1 600 and 1. */
 uint16_t sqrt_q(uint32_t x);
 
 #ifdef __cplusplus

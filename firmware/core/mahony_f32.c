@@ -1,0 +1,251 @@
+#include "mahony_f32.h"
+
+#include "turning_f32.h"
+
+#define OLDEST 0.2f           /* s that one reading of the field stands for at most */
+#define SMOOTH 0.5f           /* s, time constant of what rest is judged by */
+#define STEEP_SQUARED 2.5e-7f /* 1/4 sin^2 of the angle to the vertical below which a field has no heading */
+
+/* Low-pass gyro and accelerometer, count the time at rest, draw the bias to the mean; whether it rests. */
+INLINE_F32 int rest(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                    struct vector_f32 gyro, struct vector_f32 accel, float dt, struct vector_f32 *bias)
+{
+    const float keep = dt / (SMOOTH + dt);
+    const struct vector_f32 mean_gyro = drawn_f32(load_vector_f32(s->mean_gyro), gyro, keep);
+    const struct vector_f32 mean_accel = drawn_f32(load_vector_f32(s->mean_accel), accel, keep);
+    store_vector_f32(s->mean_gyro, mean_gyro);
+    store_vector_f32(s->mean_accel, mean_accel);
+    if (!(near_f32(gyro, mean_gyro, d->rest_gyro) && near_f32(accel, mean_accel, d->rest_accel)
+          && below_f32(mean_gyro.x, d->bias_bound) && below_f32(mean_gyro.y, d->bias_bound)
+          && below_f32(mean_gyro.z, d->bias_bound))) {
+        s->at_rest = 0.0f;
+        return 0;
+    }
+    s->at_rest += dt;
+    if (s->at_rest <= d->rest_time) {
+        return 0;
+    }
+    *bias = drawn_f32(*bias, mean_gyro, dt / (d->rest_constant + dt));
+    return 1;
+}
+
+/* By how much the accelerometer's error is shortened: a tilt error lasts in the world, a push does not. */
+INLINE_F32 float shortening(struct mahony_f32_state *restrict s,
+                               const struct mahony_f32_derived *restrict d, float east, float south, float dt)
+{
+    const float keep = dt / (d->lasting_time + dt);
+    const float lasting_east = s->lasting[0] + (east - s->lasting[0]) * keep;
+    const float lasting_north = s->lasting[1] - (south + s->lasting[1]) * keep;
+    const float limit = d->error_limit + sqrtf(lasting_east * lasting_east + lasting_north * lasting_north);
+    const float squared = east * east + south * south;
+    s->lasting[0] = lasting_east;
+    s->lasting[1] = lasting_north;
+    return squared > limit * limit && !s->starting ? limit / sqrtf(squared) : 1.0f;
+}
+
+/* The published error of the field, m/|m| x n, which leans on roll and pitch as well. */
+static struct vector_f32 published_error(struct vector_f32 north, struct vector_f32 up, struct vector_f32 mag)
+{
+    const struct vector_f32 m = scaled_f32(mag, 1.0f / sqrtf(dot_f32(mag, mag)));
+    const float along = 2.0f * dot_f32(up, m); /* component of the field along the vertical */
+    const float across = 1.0f - along * along;
+    const float flat = across > 0.0f ? sqrtf(across) : 0.0f;
+    const struct vector_f32 n = plus_f32(scaled_f32(north, 2.0f * flat), up, 2.0f * along);
+    return cross_f32(m, n);
+}
+
+/* Whether a heading so far off is held to be a disturbance: until the timeout. */
+INLINE_F32 int gated(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                        float north, float stands_for)
+{
+    if (!(north < d->gate_cosine)) {
+        s->out_of_gate = 0.0f;
+        return 0;
+    }
+    if (s->out_of_gate <= d->heading_timeout) {
+        s->out_of_gate += stands_for;
+    }
+    return s->out_of_gate <= d->heading_timeout;
+}
+
+/* Heading error times the time that the field stands for, about half the vertical; the first sets north. */
+INLINE_F32 struct vector_f32 heading_error(struct mahony_f32_state *restrict s,
+                                           const struct mahony_f32_derived *restrict d,
+                                           struct level_rows_f32 rows, struct vector_f32 mag,
+                                           struct quaternion_f32 *q, float *times)
+{
+    const struct vector_f32 none = {0.0f, 0.0f, 0.0f};
+    const float across = dot_f32(rows.east, mag), along = dot_f32(rows.north, mag);
+    const float level = across * across + along * along; /* uT^2, a quarter of the level part */
+    if (!(level > STEEP_SQUARED * dot_f32(mag, mag)) || !usable_f32(level)) {
+        return none;
+    }
+    const float scale = 1.0f / sqrtf(level), east = across * scale, north = along * scale;
+    const float stands_for = s->since_field < OLDEST ? s->since_field : OLDEST;
+    s->since_field = 0.0f;
+    if (RARELY_F32(!s->heading_known)) {
+        *q = north_set_f32(*q, east, north);
+        s->heading_known = 1;
+        return none;
+    }
+    if (gated(s, d, north, stands_for)) {
+        return none;
+    }
+    const struct vector_f32 half_up = half_up_f32(*q);
+    if (RARELY_F32(d->tilt_by_field)) {
+        *times = stands_for;
+        return published_error(rows.north, half_up, mag);
+    }
+    *times = stands_for + stands_for;
+    if (north > 0.0f) {
+        *times *= east;
+    } else if (east < 0.0f) {
+        *times = -*times;
+    }
+    return half_up;
+}
+
+INLINE_F32 float clamped(float x, float limit)
+{
+    return x > limit ? limit : (x < -limit ? -limit : x);
+}
+
+/* A bias in its limits; it hardly ever is at them, which one comparison of the three sizes tells. */
+INLINE_F32 struct vector_f32 limited(struct vector_f32 v, const struct mahony_f32_derived *restrict d)
+{
+    if (RARELY_F32((uint32_t)((bits_f32(v.x) | bits_f32(v.y) | bits_f32(v.z)) << 1) > d->bias_bound)) {
+        v.x = clamped(v.x, d->bias_limit);
+        v.y = clamped(v.y, d->bias_limit);
+        v.z = clamped(v.z, d->bias_limit);
+    }
+    return v;
+}
+
+/* A time step that nothing is integrated over begins the quick start anew. */
+static void begin(struct mahony_f32_state *restrict s)
+{
+    s->since_start = 0.0f;
+    s->at_rest = 0.0f;
+    s->starting = 1;
+}
+
+/* What the quick start adds to the gains; counts its time. */
+static float boosted(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                     float dt)
+{
+    s->since_start += dt;
+    s->starting = s->since_start < d->start_time;
+    return s->starting ? d->boost * (1.0f - s->since_start * d->start_rate) : 0.0f;
+}
+
+/* A step, with or without a magnetometer: the compiler makes two functions of it. */
+INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                     const struct imu_f32 *restrict sample, float dt, int with_field)
+{
+    const struct vector_f32 gyro = load_vector_f32(sample->gyro), zero = {0.0f, 0.0f, 0.0f};
+    float kp = d->gain, kh = d->heading_gain, ki = d->integral_gain, times = 0.0f, lasts = 0.0f;
+    if (RARELY_F32(!finite_f32(gyro))) {
+        return;
+    }
+    if (RARELY_F32(!steady_f32(dt))) {
+        begin(s);
+        dt = 0.0f;
+    }
+    if (RARELY_F32(s->starting)) {
+        const float boost = boosted(s, d, dt);
+        kp += boost;
+        kh += boost;
+        ki = s->starting ? 0.0f : ki;
+    }
+    struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
+    struct vector_f32 bias = load_vector_f32(s->gyro_bias), tilt = zero, heading = zero;
+    const struct vector_f32 accel = load_vector_f32(sample->accel);
+    const struct level_rows_f32 rows = level_rows_f32(q);
+    const float force = dot_f32(accel, accel);
+    if (RARELY_F32(!usable_f32(force))) {
+        s->at_rest = 0.0f;
+    } else {
+        if (rest(s, d, gyro, accel, dt, &bias)) {
+            ki = 0.0f;
+        }
+        const float scale = 2.0f / sqrtf(force);
+        const float east = scale * dot_f32(rows.north, accel), south = scale * dot_f32(rows.east, accel);
+        tilt = minus_f32(scaled_f32(rows.east, east), rows.north, south);
+        lasts = shortening(s, d, east, south, dt) * (dt + dt);
+    }
+    if (with_field) {
+        s->since_field += dt;
+        heading = heading_error(s, d, rows, load_vector_f32(sample->mag), &q, &times);
+        bias = minus_f32(bias, heading, ki * times);
+    }
+    bias = limited(minus_f32(bias, tilt, ki * lasts), d);
+    store_vector_f32(s->gyro_bias, bias);
+    struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, kp * lasts);
+    if (with_field) {
+        r = plus_f32(r, heading, kh * times);
+    }
+    store_quaternion_f32(s->world_q_body, turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r))));
+}
+
+void mahony_f32_step(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                     const struct imu_f32 *restrict sample, float dt)
+{
+    step(s, d, sample, dt, 1);
+}
+
+void mahony_f32_step_6d(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                        const struct imu_f32 *restrict sample, float dt)
+{
+    step(s, d, sample, dt, 0);
+}
+
+void mahony_f32_step_published(struct mahony_f32_state *restrict s,
+                               const struct mahony_f32_derived *restrict d,
+                               const struct imu_f32 *restrict sample, float dt)
+{
+    const struct vector_f32 gyro = load_vector_f32(sample->gyro), accel = load_vector_f32(sample->accel);
+    if (RARELY_F32(!finite_f32(gyro))) {
+        return;
+    }
+    if (RARELY_F32(!steady_f32(dt))) {
+        dt = 0.0f;
+    }
+    const struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
+    struct vector_f32 bias = load_vector_f32(s->gyro_bias), r = scaled_f32(gyro, dt);
+    const float force = dot_f32(accel, accel);
+    if (usable_f32(force)) {
+        const float times = 2.0f * dt / sqrtf(force);
+        const struct vector_f32 error = cross_f32(accel, half_up_f32(q));
+        bias = limited(minus_f32(bias, error, d->integral_gain * times), d);
+        r = plus_f32(r, error, d->gain * times);
+        store_vector_f32(s->gyro_bias, bias);
+    }
+    r = minus_f32(r, bias, dt);
+    store_quaternion_f32(s->world_q_body, turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r))));
+}
+
+void mahony_f32_start(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                      const struct imu_f32 *restrict first)
+{
+    (void)d;
+    memset(s, 0, sizeof *s);
+    store_quaternion_f32(s->world_q_body, level_f32(load_vector_f32(first->accel)));
+    memcpy(s->mean_gyro, first->gyro, sizeof s->mean_gyro);
+    memcpy(s->mean_accel, first->accel, sizeof s->mean_accel);
+    s->starting = 1;
+}
+
+void mahony_f32_attitude(const struct mahony_f32_state *s, float world_q_body[4])
+{
+    memcpy(world_q_body, s->world_q_body, sizeof s->world_q_body);
+}
+
+int mahony_f32_rests(const struct mahony_f32_state *s, const struct mahony_f32_derived *d)
+{
+    return s->at_rest > d->rest_time;
+}
+
+int mahony_f32_disturbed(const struct mahony_f32_state *s)
+{
+    return s->out_of_gate > 0.0f;
+}
