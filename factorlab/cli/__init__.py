@@ -12,6 +12,7 @@ from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
 from factorlab.cli.info import info
+from factorlab.cli.record import record
 from factorlab.cli.tune import tune
 
 __all__ = ["main"]
@@ -42,5 +43,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, characterize, calibrate, attitude, info, doctor):
+for command in (demo, compare, tune, characterize, calibrate, attitude, record, info, doctor):
     main.add_command(command)

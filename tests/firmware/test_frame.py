@@ -2,12 +2,11 @@
 
 import ctypes
 import math
-import subprocess
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from serial_board import BootFacts, encoders, written
 from serial_worlds import BOOTS, CLOCK, COUNT, SEQUENCE, several
 
 from sequential.readers.serial import (
@@ -21,47 +20,14 @@ from sequential.readers.serial import (
 )
 from sequential.readers.serial_frames import FILTERS, SENSORS, TARGETS
 
-CORE = Path(__file__).parents[2] / "firmware" / "core"
-FLAGS = [
-    *("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror"),
-    *("-ffp-contract=off", "-O2"),
-]
 LONG = st.integers(-(2**31), 2**31 - 1)
 BYTE = st.integers(0, 255)
 TURN = 2.0 * math.pi / 65536.0
 
 
-class BootFacts(ctypes.Structure):
-    _fields_ = (
-        ("version", ctypes.c_uint8 * 3),
-        ("target", ctypes.c_uint8),
-        ("filter", ctypes.c_uint8),
-        ("sensor", ctypes.c_uint8),
-        ("rate_hz", ctypes.c_uint16),
-        ("calibration_hash", ctypes.c_uint32),
-        ("gyro_range_deg_s", ctypes.c_uint16),
-        ("accel_range_g", ctypes.c_uint8),
-    )
-
-
 @pytest.fixture(scope="module")
 def core(c_compiler, tmp_path_factory) -> ctypes.CDLL:
-    library = tmp_path_factory.mktemp("core") / "frames.so"
-    sources = [CORE / name for name in ("crc16.c", "frame.c", "text.c")]
-    subprocess.run([c_compiler, *FLAGS, "-shared", "-fPIC", *sources, "-o", library], check=True)
-    functions = ctypes.CDLL(str(library))
-    functions.crc16.restype = ctypes.c_uint16
-    for name in ("frame_quaternion", "frame_angles", "frame_raw", "frame_boot", "text_attitude"):
-        getattr(functions, name).restype = ctypes.c_uint8
-    return functions
-
-
-def written(function, *arguments):
-    """The bytes that an encoder writes, and nothing behind them."""
-    out = (ctypes.c_uint8 * 64)(*[0xEE] * 64)
-    length = function(out, *arguments)
-    assert set(out[length:]) == {0xEE}
-    return bytes(out[:length])
+    return encoders(c_compiler, tmp_path_factory.mktemp("core"))
 
 
 def bitwise_check(data: bytes) -> int:
