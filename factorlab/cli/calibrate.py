@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 import click
+
+from factorlab.cli.late import LateGroup
 
 __all__ = ["calibrate"]
 
-# command: module and attribute, and the line of `calibrate --help`, which so costs no import
 COMMANDS = {
     "accel": (
         "factorlab.cli.calibrate_imu",
@@ -23,28 +22,11 @@ COMMANDS = {
 }
 
 
-class LateGroup(click.Group):
-    """A group that imports a command when it runs, or when its own help is shown."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names in the order of the table."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command itself; None where there is none of that name."""
-        if cmd_name not in COMMANDS:
-            return None
-        module, attribute, _ = COMMANDS[cmd_name]
-        command: click.Command = getattr(import_module(module), attribute)
-        return command
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list of `--help`, without importing what it names."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, _, line) in COMMANDS.items()])
-
-
-@click.command(cls=LateGroup, short_help="Constants of a sensor from a recording, with intervals and export.")
+@click.command(
+    cls=LateGroup,
+    table=COMMANDS,
+    short_help="Constants of a sensor from a recording, with intervals and export.",
+)
 def calibrate() -> None:
     """Find a sensor's constants: gain, offset, misalignment, with 95 % intervals.
 

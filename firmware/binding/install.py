@@ -16,7 +16,7 @@ PACKAGE = Path("sequential", "firmware")
 
 
 class CompileCore(build_ext):
-    """The shared object, by the same command as `python -m sequential.firmware.build`."""
+    """The shared object, by the same command as `python -m sequential.firmware`."""
 
     def build_extension(self, ext):
         """Compile every C file of core and binding; an optional extension that fails is left out."""

@@ -1,4 +1,4 @@
-"""Compile the C core of `firmware/` into one shared object: `python -m sequential.firmware.build`.
+"""Compile the C core of `firmware/` into one shared object: `python -m sequential.firmware`.
 
 Only the standard library is imported here, because the installation runs this file on its own.
 """
@@ -88,7 +88,3 @@ def main() -> int:
         return 1
     sys.stdout.write(f"{made}\n")
     return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -38,8 +38,7 @@ class FirmwareFilter(AttitudeFilter):
 
     ENTRY: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[str, ...]] = ()
-    STATE: ClassVar[int] = 0
-    KNOWS: ClassVar[frozenset[str]] = frozenset()  # of gyro_bias, rest, magnetic_disturbance
+    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body",)  # fields of an attitude history
 
     def __post_init__(self) -> None:
         if self.magnetometer is None:
@@ -56,34 +55,27 @@ class FirmwareFilter(AttitudeFilter):
         return np.array([float(getattr(self.reference, name)) for name in self.FIELDS])
 
     def start(self, gyro: ArrayLike, accel: ArrayLike) -> Array:
-        """State from a first sample, in the layout of the Python filter."""
-        return calls.start(
-            self.ENTRY, self.settings, np.hstack(sample(gyro, accel, None)), self.STATE, self._rate(None)
-        )
+        """State from a first sample; its layout is the class's, and begins with the attitude."""
+        first = np.hstack(sample(gyro, accel, None))
+        return calls.start(self.ENTRY, self.settings, first, self._rate(None))
 
     def step(
         self, state: ArrayLike, gyro: ArrayLike, accel: ArrayLike, mag: ArrayLike | None, dt: float
     ) -> Array:
-        """Next state, dt seconds after the last sample, in the layout of the Python filter."""
-        own = own_state(state, self.STATE, type(self).__name__)
-        calls.step(self.ENTRY, self.settings, own, np.hstack(sample(gyro, accel, mag)), dt, self._rate(None))
+        """Next state, dt seconds after the last sample."""
+        own = own_state(state, calls.state_size(self.ENTRY), type(self).__name__)
+        next_one = np.hstack(sample(gyro, accel, mag))
+        calls.step(self.ENTRY, self.settings, own, next_one, dt, self._rate(None))
         return own
 
     def estimate(self, recording: ImuRecording) -> AttitudeHistory:
         """Orientation at every sample of a recording, and what else the filter knows."""
         gyro, accel, mag = self.samples(recording)
         field = None if mag is NO_FIELD else mag
-        found = calls.run(self.ENTRY, self.settings, recording.t, gyro, accel, field, self._rate(recording))
-        return AttitudeHistory(
-            recording.t,
-            found.world_q_body,
-            gyro_bias=found.bias if "gyro_bias" in self.KNOWS else None,
-            rest=found.rest if "rest" in self.KNOWS else None,
-            magnetic_disturbance=(
-                found.disturbed if "magnetic_disturbance" in self.KNOWS and field is not None else None
-            ),
-            name=self.name,
-        )
+        known = [name for name in self.KNOWS if field is not None or name != "magnetic_disturbance"]
+        rate = self._rate(recording)
+        found = calls.run(self.ENTRY, known, self.settings, recording.t, gyro, accel, field, rate)
+        return AttitudeHistory(recording.t, **found, name=self.name)
 
     def _rate(self, recording: ImuRecording | None) -> float:
         """Nominal rate, Hz; only fixed point counts in it."""

@@ -11,7 +11,7 @@ from sequential.firmware.build import compile_core, library_path, source_folder
 
 __all__ = ["load_library", "missing"]
 
-REMEDY = "then run `python -m sequential.firmware.build`"
+REMEDY = "then run `python -m sequential.firmware`"
 
 
 @functools.cache

@@ -57,7 +57,7 @@ def test_what_changed_is_compiled_anew(checkout, c_compiler):
 def test_no_compiler_is_said_in_one_sentence(checkout, monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
     monkeypatch.delenv("CC", raising=False)
-    with pytest.raises(ToolMissingError, match=r"apt install gcc.*python -m sequential\.firmware\.build"):
+    with pytest.raises(ToolMissingError, match=r"apt install gcc.*python -m sequential\.firmware`"):
         library.load_library()
     assert "\n" not in library.missing()
 

@@ -1,0 +1,47 @@
+"""Mahony's filter of the firmware."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, final
+
+from sequential.attitude.mahony import Mahony
+from sequential.firmware.filters import FirmwareFilter
+
+__all__ = ["CMahony"]
+
+
+@final
+@dataclass(frozen=True)
+class CMahony(FirmwareFilter):
+    """`Mahony` in C, single precision: firmware/core/mahony_f32.c, as the Cortex-M4 runs it.
+
+    Parameters
+    ----------
+    magnetometer : use it (9-D) or not (6-D); None where `design` says nothing and the recording has one
+    design : its settings
+
+    Notes
+    -----
+    State (20,) of `start` and `step`: that of `Mahony`.
+    """
+
+    design: Mahony = field(default_factory=Mahony)
+
+    ENTRY: ClassVar[str] = "mahony_f32"
+    FIELDS: ClassVar[tuple[str, ...]] = (
+        "gain", "heading_gain", "integral_gain", "bias_limit", "error_limit", "lasting_time", "heading_gate",
+        "heading_timeout", "start_gain", "start_time", "rest_gyro", "rest_accel", "rest_time",
+        "rest_constant", "tilt_by_field", "order",
+    )  # fmt: skip
+    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias", "rest", "magnetic_disturbance")
+
+    @property
+    def name(self) -> str:
+        """c-mahony."""
+        return "c-mahony"
+
+    @property
+    def reference(self) -> Mahony:
+        """The Python filter."""
+        return self.design

@@ -1,0 +1,83 @@
+"""The C filters as estimators: laws of the family, and equality with their Python models."""
+
+import numpy as np
+import pytest
+from attitude_worlds import seen, swinging
+
+from sequential import firmware
+from sequential.attitude import attitude_from_angles
+from sequential.evaluate import attitude_error
+
+FLOAT = [kind for name in ("CMahony",) if (kind := getattr(firmware, name, None))]
+EVERY = list(FLOAT)
+each = pytest.mark.parametrize("kind", EVERY, ids=lambda kind: kind.__name__)
+each_float = pytest.mark.parametrize("kind", FLOAT, ids=lambda kind: kind.__name__)
+
+
+@pytest.fixture(autouse=True)
+def _compiled(c_compiler):
+    """Everything here runs the shared object."""
+
+
+@pytest.fixture
+def moved(rng):
+    t, angles = swinging(20.0)
+    return seen(t, attitude_from_angles(angles), rng=rng)
+
+
+@each_float
+@pytest.mark.parametrize("magnetometer", [True, False])
+def test_a_recording_gives_what_python_gives(kind, magnetometer, moved):
+    ported = kind(magnetometer=magnetometer)
+    own, theirs = ported.estimate(moved), type(ported.design)(magnetometer=magnetometer).estimate(moved)
+    apart = attitude_error(own.world_q_body, theirs.world_q_body).errors[:, 0]
+    assert np.degrees(apart.max()) < 0.01
+    if theirs.rest is not None:
+        assert np.count_nonzero(own.rest != theirs.rest) <= 2, "times add up to a rounding"
+    if theirs.gyro_bias is not None:
+        np.testing.assert_allclose(own.gyro_bias, theirs.gyro_bias, atol=1e-5)
+
+
+@each
+def test_steps_are_the_batch(kind, moved):
+    """One sample at a time or all at once: the same bits."""
+    ported, some = kind(magnetometer=True), moved.select(slice(0, 400))
+    path = ported.estimate(some).world_q_body
+    state = ported.start(some.gyro[0], some.accel[0])
+    for k in range(len(some)):
+        dt = float(some.t[k] - some.t[k - 1]) * 1e-9 if k else 0.0
+        state = ported.step(state, some.gyro[k], some.accel[k], some.mag[k], dt)
+        assert np.array_equal(path[k], state[:4]) or np.array_equal(path[k], -state[:4])
+
+
+@each
+def test_many_recordings_in_threads(kind, moved):
+    every = [moved, moved.select(slice(0, 500)), moved]
+    for one, path in zip(every, kind().estimate_many(every, threads=2), strict=True):
+        np.testing.assert_array_equal(path.world_q_body, kind().estimate(one).world_q_body)
+
+
+@each
+def test_the_design_hands_its_settings_over(kind, moved):
+    plain = kind(magnetometer=False).design
+    assert kind(design=plain.__class__(magnetometer=False)).magnetometer is False
+    name = kind.FIELDS[0]
+    other = kind(design=type(plain)(**{name: 2.0 * getattr(plain, name)}))
+    assert other.settings[0] == 2.0 * kind().settings[0]
+    assert not np.array_equal(other.estimate(moved).world_q_body, kind().estimate(moved).world_q_body)
+
+
+@each
+def test_bad_samples_leave_a_finite_attitude(kind, moved):
+    """What a board meets in its worst minute: the answer stays a rotation."""
+    ported = kind(magnetometer=True)
+    state = ported.start(moved.gyro[0], moved.accel[0])
+    bad = [np.full(3, value) for value in (np.nan, np.inf, -np.inf, 0.0, 1e4, 34.9)]
+    for k in range(600):
+        gyro, accel, mag = moved.gyro[k], moved.accel[k], moved.mag[k]
+        worst = bad[k // 3 % len(bad)] if k % 3 else None
+        if worst is not None:
+            gyro, accel, mag = (worst if k % 5 == i else v for i, v in enumerate((gyro, accel, mag)))
+        dt = (0.01, -1.0, np.nan, 5.0)[k % 4]
+        state = ported.step(state, gyro, accel, mag, dt)
+        assert np.linalg.norm(state[:4]) == pytest.approx(1.0, abs=1e-5)
