@@ -2,6 +2,7 @@
 
 #include "../core/frame.h"
 #include "../core/text.h"
+#include "../core/trig_q.h"
 #include "board.h"
 #include "filter.h"
 #include "mpu6050.h"
@@ -57,12 +58,19 @@ static void send_quaternion(uint8_t status)
     send_rest(frame, frame_quaternion(frame, app.sequence, board_time_us(), world_q_body, bias, status));
 }
 
+static void angles_now(int16_t roll_pitch_yaw[3])
+{
+    int32_t world_q_body[4];
+    filter_attitude(world_q_body);
+    angles_q(world_q_body, roll_pitch_yaw);
+}
+
 static void send_angles(uint8_t status)
 {
     uint8_t frame[FRAME_LARGEST];
     int16_t angles[3];
     int32_t bias[3];
-    filter_angles(angles);
+    angles_now(angles);
     send_first(FRAME_START);
     filter_bias(bias);
     send_rest(frame, frame_angles(frame, app.sequence, board_time_us(), angles, bias, status));
@@ -72,7 +80,7 @@ static void send_text(void)
 {
     uint8_t line[TEXT_LARGEST];
     int16_t angles[3];
-    filter_angles(angles);
+    angles_now(angles);
     send_first('$');
     send_rest(line, text_attitude(line, app.sequence, board_time_us(), angles));
 }

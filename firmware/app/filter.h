@@ -22,7 +22,6 @@ void filter_start(void);
 void filter_update(const int16_t counts[7] /* ax ay az temperature gx gy gz */, uint8_t periods);
 
 void filter_attitude(int32_t world_q_body[4] /* Q30 */);
-void filter_angles(int16_t roll_pitch_yaw[3] /* 65536 = 360 deg */);
 void filter_bias(int32_t bias[3] /* rad/s, Q24 */);
 uint8_t filter_status(void); /* FRAME_REST | FRAME_ACCEL_REJECTED */
 

@@ -22,11 +22,6 @@ void filter_attitude(int32_t world_q_body[4])
     world_q_body[1] = world_q_body[2] = world_q_body[3] = 0;
 }
 
-void filter_angles(int16_t roll_pitch_yaw[3])
-{
-    roll_pitch_yaw[0] = roll_pitch_yaw[1] = roll_pitch_yaw[2] = 0;
-}
-
 void filter_bias(int32_t bias[3])
 {
     bias[0] = bias[1] = bias[2] = 0;

@@ -17,10 +17,13 @@
 extern "C" {
 #endif
 
+#ifndef FACTORLAB_AFFINE_F32 /* headers of constants define it too, to be of use alone */
+#define FACTORLAB_AFFINE_F32
 struct affine_f32 {
     float matrix[3][3]; /* SI per count: rad/s, m/s^2 or uT */
     float offset[3];    /* counts */
 };
+#endif
 
 static inline void calibrate_f32(const struct affine_f32 *calibration, const int16_t raw[3], float out[3])
 {
