@@ -36,7 +36,12 @@ def record() -> None:
     help="CSV to write; attitudes also as FILE.tum.",
 )
 @click.option("--mode", type=click.Choice(MODES), default="raw", show_default=True, help="What to ask for.")
-@click.option("--baud", type=click.IntRange(min=50), default=250_000, show_default=True, help="Bit/s.")
+@click.option(
+    "--baud",
+    type=click.IntRange(min=50),
+    metavar="BIT/S",
+    help="Speed of the line.  [default: found out, 500000 first]",
+)
 @click.option(
     "--seconds",
     type=click.FloatRange(min=0, min_open=True),

@@ -18,6 +18,7 @@ __all__ = ["MODES", "RecordSettings", "record_serial"]
 
 MODES = {"raw": b"r", "quaternion": b"q", "angles": b"a", "text": b"t"}
 BOOT = b"b"
+SPEED_S = 0.6  # for a first frame at one speed, where bytes come
 ASK_S = 0.3  # between two requests: a board that is starting does not hear the first
 
 
@@ -92,6 +93,7 @@ def _listen(
 ) -> str:
     """Take frames; returns what went wrong, empty where nothing did."""
     began, asked, heard = time.monotonic(), -math.inf, 0.0
+    trial, patience = 0.0, min(SPEED_S, 0.5 * settings.wait)  # since the speed of the line was changed
     while not (stopped() or taker.full):
         elapsed = time.monotonic() - began
         if taker.wants and elapsed - asked >= ASK_S:
@@ -100,9 +102,11 @@ def _listen(
         if data := port.receive():
             taker.feed(data, time.monotonic_ns())
             heard = elapsed
-        if not taker.samples and elapsed > settings.wait:
-            return f"{port.name} {taker.silence(port.baud)} (waited {settings.wait:g} s)"
-        if taker.samples and elapsed > settings.wait:
+        if taker.unreadable and elapsed - trial > patience and port.next_speed():
+            taker.unreadable, trial, asked = False, elapsed, -math.inf
+        if elapsed - trial > settings.wait:
+            if not taker.samples:
+                return f"{port.name} {taker.silence(port.tried)} (waited {elapsed:.1f} s)"
             taker.begin()
         if settings.seconds is not None and elapsed - heard > max(settings.wait, 1.0):
             return f"{port.name} has sent nothing for {elapsed - heard:.1f} s"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["PortLostError", "SerialPort"]
 
 PATIENCE_S = 0.05  # how long `receive` waits for a first byte
+SPEEDS = (500_000, 250_000, 115_200, 1_000_000)  # the firmware's own first, then what else it is built for
 
 
 class PortLostError(DataError):
@@ -27,7 +28,7 @@ class SerialPort:
     Parameters
     ----------
     name : `/dev/ttyUSB0`, `COM3`, or any address that pyserial knows, such as `socket://host:port`
-    baud : bits a second
+    baud : bits a second; by default the firmware's, and `next_speed` tries others
 
     Raises
     ------
@@ -35,8 +36,10 @@ class SerialPort:
         when it is opened: pyserial is not installed, or the port is missing, busy, not permitted, no port.
     """
 
-    def __init__(self, name: str, baud: int = 250_000) -> None:
-        self.name, self.baud = name, baud
+    def __init__(self, name: str, baud: int | None = None) -> None:
+        self.name = name
+        self._speeds = SPEEDS if baud is None else (baud,)
+        self._at = 0
         self._port: Serial | None = None
 
     def __enter__(self) -> Self:
@@ -48,10 +51,10 @@ class SerialPort:
         options: dict[str, Any] = {} if "://" in self.name else {"exclusive": True}
         try:
             self._port = serial.serial_for_url(
-                self.name, baudrate=self.baud, timeout=PATIENCE_S, write_timeout=1.0, **options
+                self.name, baudrate=self._speeds[0], timeout=PATIENCE_S, write_timeout=1.0, **options
             )
         except (serial.SerialException, OSError, ValueError) as fault:
-            raise DataError(_why(self.name, self.baud, fault)) from fault
+            raise DataError(_why(self.name, self._speeds[0], fault)) from fault
         return self
 
     def __exit__(
@@ -59,6 +62,24 @@ class SerialPort:
     ) -> None:
         if self._port is not None:
             self._port.close()
+
+    @property
+    def tried(self) -> str:
+        """The speeds so far, bit/s."""
+        return ", ".join(map(str, self._speeds[: self._at + 1]))
+
+    def next_speed(self) -> bool:
+        """Go on to another speed, where there is one; what came at the old one is dropped."""
+        if self._at + 1 == len(self._speeds):
+            return False
+        self._at += 1
+        assert self._port is not None  # noqa: S101 - used inside its block
+        try:
+            self._port.baudrate = self._speeds[self._at]
+            self._port.reset_input_buffer()
+        except (OSError, ValueError):  # this port cannot have it
+            return self.next_speed()
+        return True
 
     def receive(self) -> bytes:
         """Give what has come, after at most 50 ms; empty where nothing did. Raises `PortLostError`."""

@@ -36,6 +36,10 @@ class Taker:
     mode : `raw`, `quaternion`, `angles` or `text`
     wanted_s : seconds to take, by the board's clock; None: all
     file : to write to
+
+    Attributes
+    ----------
+    unreadable : bytes came and not one frame was among them
     """
 
     def __init__(self, mode: str, wanted_s: float | None, file: GrowingFile) -> None:
@@ -48,6 +52,8 @@ class Taker:
         self._before: tuple[int, int] | None = None  # corrupt frames and bytes of none, before the first
         self._counts = dict.fromkeys(COUNTED, 0)
         self._bytes = 0
+        self._starting = False  # frames came, but no sample yet
+        self.unreadable = False
         self._other: Frame | None = None  # of another kind, and no wanted one since
 
     @property
@@ -80,7 +86,9 @@ class Taker:
     def feed(self, data: bytes, arrival_ns: int) -> None:
         """Take bytes that came at this time of a clock that never runs backwards."""
         self._bytes += len(data)
-        for frame in self._decoder.feed(data):
+        frames = self._decoder.feed(data)
+        self.unreadable = not self._decoder.frames
+        for frame in frames:
             self._take(frame, arrival_ns)
 
     def begin(self) -> None:
@@ -100,9 +108,9 @@ class Taker:
             self.begin()
         self._file.close()
 
-    def silence(self, baud: int) -> str:
+    def silence(self, tried: str) -> str:
         """What is wrong with a line on which no sample came."""
-        if self._counts["missing"]:
+        if self._starting:
             return "sends frames, but its sensor gives no sample; check VCC, GND, SDA and SCL of the sensor"
         if self._other is not None:
             return (
@@ -111,8 +119,8 @@ class Taker:
             )
         if self._bytes:
             return (
-                f"sent {self._bytes} bytes and no frame among them; check the speed (--baud, now {baud}; the "
-                "firmware's is 250000) and that the board runs this firmware"
+                f"sent {self._bytes} bytes and no frame among them at {tried} bit/s; check --baud, and that "
+                "the board runs this firmware"
             )
         return "sent nothing; is the firmware on the board, its TX pin connected, its supply on?"
 
@@ -169,9 +177,15 @@ class Taker:
         return isinstance(frame, AngleFrame) and (frame.bias is None) == (self._mode == "text")
 
     def _is_sample(self, frame: Frame) -> bool:
-        """Count what the status says; raw counts of a missing sample are those of an earlier one."""
+        """Count what the status says; raw counts of a missing sample are those of an earlier one.
+
+        A sensor that has given none yet is starting, which is no fault unless it never ends.
+        """
         assert not isinstance(frame, BootFrame)  # noqa: S101 - those are never ours
         status = frame.status or Status(0)
+        if status & Status.SAMPLE_MISSING and not self.samples:
+            self._starting = True
+            return False
         for name, bit in COUNTED.items():
             self._counts[name] += bool(status & bit)
         return not (self._mode == "raw" and status & Status.SAMPLE_MISSING)

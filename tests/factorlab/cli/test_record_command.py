@@ -171,7 +171,10 @@ def test_a_board_that_is_unplugged_ends_the_recording_and_keeps_it(core, tmp_pat
     [
         ({"mode": "q", "hears": False}, "no raw frame though it was asked"),
         ({"starts_s": 1.0}, "sent nothing; is the firmware on the board"),
-        ({"mode": "x", "hears": False}, "and no frame among them; check the speed (--baud, now 250000"),
+        (
+            {"mode": "x", "hears": False, "boots": False},
+            "and no frame among them at 500000, 250000, 115200, 1000000 bit/s",
+        ),
         ({"lasts": 0, "starts_s": 0.1}, "went away"),
         ({"missing": frozenset(range(100_000))}, "its sensor gives no sample"),
     ],
@@ -223,3 +226,19 @@ def test_a_file_that_is_there_is_kept(core, tmp_path):
         assert record(board.port, path, "--seconds", "1", "--force").exit_code == 0
         assert "no folder" in record(board.port, tmp_path / "no" / "imu.csv").stderr
     assert len(read_imu(path)) == 100
+
+
+def test_the_speed_is_found_out(core, tmp_path, monkeypatch):
+    """A terminal has no speed of its own, so the board is garbled unless it is read at 115200."""
+    read = SerialPort.receive
+
+    def garbled(port):
+        data = read(port)
+        return data if port.tried.endswith("115200") else bytes(byte & 0x55 for byte in data)
+
+    monkeypatch.setattr(SerialPort, "receive", garbled)
+    with Board(core, pause_s=0.002) as board:
+        told = recorded(board.port, tmp_path / "imu.csv", "--seconds", "1", "--wait", "1")
+        assert (told["samples"], told["lost"], told["discarded"]) == (100, 0, 0)
+        done = record(board.port, tmp_path / "other.csv", "--baud", "57600", "--wait", "0.3")
+    assert "no frame among them at 57600 bit/s" in done.stderr

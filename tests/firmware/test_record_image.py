@@ -1,0 +1,56 @@
+"""`factorlab record serial` on the image for the ATmega328P, run in real time behind a pseudo-terminal."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from factorlab.cli import main
+from factorlab.firmware.avr import live_avr
+from factorlab.firmware.emulation import mpu6050_counts
+from sequential.readers import read_imu
+from sequential.sensors import simulate_imu, tumble
+
+SECONDS = 1.5
+
+
+@pytest.fixture
+def counts(rng):
+    """A sensor turned in a hand, with the noise that tells it from one that is stuck."""
+    recording = simulate_imu(tumble(10.0, rng, rest=1.0), rng, rate=100.0, field=None).recording
+    return np.clip(mpu6050_counts(recording) + rng.integers(-4, 5, (1001, 7)), -32768, 32767)
+
+
+def recorded(image, counts, simulator, path, *options):
+    with live_avr(image, counts, simulator=simulator) as port:
+        done = CliRunner().invoke(
+            main,
+            ["record", "serial", port, "-o", str(path), "--seconds", str(SECONDS), "--json", *options],
+        )
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert (told["lost"], told["corrupt"], told["discarded"], told["missing"]) == (0, 0, 0, 0)
+    assert told["board"]["target"] == "atmega328p"
+    assert told["samples"] == round(SECONDS * 100)
+    assert told["timing"]["period_ms"] == 10.0
+    return told
+
+
+def test_raw_samples_are_those_of_the_sensor(avr_image, avr_simulator, counts, tmp_path):
+    path = tmp_path / "imu.csv"
+    recorded(avr_image(FILTER="none"), counts, avr_simulator, path)
+    imu = read_imu(path)
+    scales = [8 * 9.80665 / 32768] * 3 + [np.radians(2000) / 32768] * 3
+    found = np.rint(np.hstack([imu.accel, imu.gyro]) / scales).astype(int)
+    starts = np.flatnonzero((counts[:, [0, 1, 2, 4, 5, 6]] == found[0]).all(axis=1))
+    assert len(starts) == 1
+    window = counts[starts[0] : starts[0] + len(found)][:, [0, 1, 2, 4, 5, 6]]
+    np.testing.assert_array_equal(found, window)
+
+
+def test_a_recording_of_the_board_goes_through_attitude(avr_image, avr_simulator, counts, tmp_path):
+    path = tmp_path / "imu.csv"
+    recorded(avr_image(FILTER="none"), counts, avr_simulator, path)
+    done = CliRunner().invoke(main, ["attitude", str(path), "--filter", "mahony", "--json"])
+    assert done.exit_code == 0, done.output
