@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from c_structs import library, structs
 
-from sequential.attitude import Mahony
+from sequential.attitude import ComplementaryAttitude, Mahony, TiltKalman
 from sequential.attitude.estimator import AttitudeFilter
 
 STEP_TOLERANCE = 1e-6
@@ -61,6 +61,39 @@ def published_seen(_python: AttitudeFilter, state: np.ndarray) -> np.ndarray:
 MAHONY = Pair("mahony_f32", ("mahony_f32", "mahony_f32_settings"), Mahony(), mahony_numbers, mahony_seen)
 
 
+def complementary_numbers(state: Any) -> list[float]:
+    """State of complementary_kernel."""
+    return [*state.world_q_body, state.since_field, float(state.heading_known)]
+
+
+def tilt_numbers(state: Any) -> list[float]:
+    """State of tilt_kernel; the last rates are not kept in C."""
+    return [
+        *state.angle, *state.bias, *state.angle_variance, *state.covariance, *state.bias_variance,
+        float(state.heading_known), 0.0, 0.0, 0.0,
+    ]  # fmt: skip
+
+
+def tilt_seen(_python: AttitudeFilter, state: np.ndarray) -> np.ndarray:
+    """Angles on the circle, so that -π is π; without the last rates."""
+    return np.concatenate([np.sin(state[:3]), np.cos(state[:3]), state[3:16]])
+
+
+def all_seen(_python: AttitudeFilter, state: np.ndarray) -> np.ndarray:
+    """The whole state."""
+    return state
+
+
+COMPLEMENTARY = Pair(
+    "complementary_f32",
+    ("complementary_f32", "trig_f32"),
+    ComplementaryAttitude(),
+    complementary_numbers,
+    all_seen,
+)
+TILT = Pair("tilt_f32", ("tilt_f32", "angles_f32", "trig_f32"), TiltKalman(), tilt_numbers, tilt_seen)
+
+
 class FloatFilter:
     """A filter of the core, compiled for this machine, with a state of its own."""
 
@@ -85,6 +118,8 @@ class FloatFilter:
             if hasattr(self.settings, field.name):
                 value = getattr(python, field.name)
                 setattr(self.settings, field.name, value)
+        if isinstance(python, TiltKalman):
+            self.settings.nis_gate = python.settings[4]
         self.call("derive", self.settings, self.derived)
 
     def start(self, sample: np.ndarray) -> None:

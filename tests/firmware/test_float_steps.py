@@ -4,12 +4,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from float_filters import MAHONY, STEP_TOLERANCE, FloatFilter, published_seen, single_settings
+from float_filters import (
+    COMPLEMENTARY,
+    MAHONY,
+    STEP_TOLERANCE,
+    TILT,
+    FloatFilter,
+    published_seen,
+    single_settings,
+)
 
-from sequential.attitude import Mahony
+from sequential.attitude import ComplementaryAttitude, Mahony, TiltKalman
 from sequential.readers import read_broad
 
 CASES = {
+    "complementary 9-D": (COMPLEMENTARY, ComplementaryAttitude()),
+    "complementary 6-D": (COMPLEMENTARY, ComplementaryAttitude(magnetometer=False)),
+    "complementary, slow and quick": (COMPLEMENTARY, ComplementaryAttitude(None, 0.02, 0.5)),
+    "kalman 9-D": (TILT, TiltKalman()),
+    "kalman 6-D": (TILT, TiltKalman(magnetometer=False)),
+    "kalman, gated": (TILT, TiltKalman(gate=0.99)),
     "mahony 9-D": (MAHONY, Mahony()),
     "mahony 6-D": (replace(MAHONY, suffix="_step_6d"), Mahony(magnetometer=False)),
     "mahony as published": (MAHONY, Mahony.as_published(0.7, 0.001)),
