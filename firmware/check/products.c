@@ -39,6 +39,7 @@ static uint8_t differences(uint32_t a, uint32_t b)
     int32_t a32 = (int32_t)a;
     count = (uint8_t)(count + (mul16_q(a16, b16) != mul16_c(a16, b16)));
     count = (uint8_t)(count + (mul16u_q(a16, (uint16_t)b) != mul16u_c(a16, (uint16_t)b)));
+    count = (uint8_t)(count + (mulu16_q((uint16_t)a, (uint16_t)b) != mulu16_c((uint16_t)a, (uint16_t)b)));
     count = (uint8_t)(count + (mul32u16_q(a32, (uint16_t)b) != mul32u16_c(a32, (uint16_t)b)));
     count = (uint8_t)(count + (mul32u24_q(a32, b & 0xFFFFFFUL) != mul32u24_c(a32, b & 0xFFFFFFUL)));
     if (a != 0x80000000UL) {

@@ -34,14 +34,14 @@ struct affine_q {
 #endif
 
 /* To SI in Q24: a gyro's rad/s. */
-void calibrate_q24(const struct affine_q *affine, const int16_t raw[3], int32_t calibrated[3] /* SI, Q24 */);
+void calibrate_q24(const struct affine_q *affine, const int16_t raw[3], int32_t out[3] /* SI, Q24 */);
 
 /* To SI in Q8: m/s^2, uT. */
-void calibrate_q8(const struct affine_q *affine, const int16_t raw[3], int16_t calibrated[3] /* SI, Q8 */);
+void calibrate_q8(const struct affine_q *affine, const int16_t raw[3], int16_t out[3] /* SI, Q8 */);
 
 /* A whole sample; `mag` NULL: there is no magnetometer. */
 void calibrate_q(const struct affine_q *gyro, const struct affine_q *accel, const struct affine_q *mag,
-                 const struct imu_raw *raw, struct imu_q *calibrated);
+                 const struct imu_raw *raw, struct imu_q *out);
 
 #ifdef __cplusplus
 }

@@ -29,6 +29,9 @@ static inline int32_t mul16_c(int16_t a, int16_t b) { return (int32_t)a * b; }
 static inline int32_t mul16u_c(int16_t a, uint16_t b) { return (int32_t)((int64_t)a * b); }
 
 /* a b / 2^16, rounded. */
+static inline uint16_t mulu16_c(uint16_t a, uint16_t b) { return (uint16_t)(((uint32_t)a * b + 0x8000U) >> 16); }
+
+/* a b / 2^16, rounded. */
 static inline int32_t mul32u16_c(int32_t a, uint16_t b) { return (int32_t)(((int64_t)a * b + 0x8000) >> 16); }
 
 /* a b / 2^16, rounded; |a b| < 2^47 - 2^15. */
@@ -45,6 +48,7 @@ static inline int32_t mul32_c(int32_t a, int32_t b) { return (int32_t)(((int64_t
 #else
 #define mul16_q mul16_c
 #define mul16u_q mul16u_c
+#define mulu16_q mulu16_c
 #define mul32u16_q mul32u16_c
 #define mul32x16_q mul32x16_c
 #define mul32u24_q mul32u24_c

@@ -3,12 +3,6 @@
 #include "divide_q.h"
 #include "fixed_q.h"
 
-/* (a * b + 2^15) / 2^16 of a positive coefficient. */
-static uint16_t times(int16_t coefficient, uint16_t b)
-{
-    return (uint16_t)high16_q(mul16u_q(coefficient, b));
-}
-
 /* Angle in [0, 45] deg of 0 <= y <= x, x > 0: 2^32 = 360 deg; and the square of y / x, Q16. */
 static uint32_t octant(uint32_t y, uint32_t x, uint16_t *squared)
 {
@@ -25,15 +19,16 @@ static uint32_t octant(uint32_t y, uint32_t x, uint16_t *squared)
         y <<= 1;
     }
     slope = divide_q(y, x > UINT32_C(0xFFFF7FFF) ? 0xFFFFU : (uint16_t)((x + 0x8000U) >> 16));
-    u = (uint16_t)(((uint32_t)slope * slope) >> 16);
+    u = mulu16_q(slope, slope);
     *squared = u;
     /* atan(s) / s - 1 / 8 in 2^-19 turns */
-    p = (uint16_t)(4393U - times(978, u));
-    p = (uint16_t)(9715U - times((int16_t)p, u));
-    p = (uint16_t)(16150U - times((int16_t)p, u));
-    p = (uint16_t)(27755U - times((int16_t)p, u));
-    p = (uint16_t)(17905U - times((int16_t)p, u));
-    return ((uint32_t)slope << 13) + (((uint32_t)slope * p) >> 3);
+    p = (uint16_t)(4393U - mulu16_q(978, u));
+    p = (uint16_t)(9715U - mulu16_q(p, u));
+    p = (uint16_t)(16150U - mulu16_q(p, u));
+    p = (uint16_t)(27755U - mulu16_q(p, u));
+    p = (uint16_t)(17905U - mulu16_q(p, u));
+    /* (2^16 + p) slope / 8, halved first so that the sum fits */
+    return ((((uint32_t)slope << 16) >> 1) + (((uint32_t)slope * p) >> 1)) >> 2;
 }
 
 /* |x| of all 32 bits. */
@@ -91,10 +86,10 @@ uint32_t polar_q32(int32_t y, int32_t x, uint32_t *length)
     uint32_t angle = direction(y, x, &larger, &u);
     uint16_t p; /* (sqrt(1 + u) - 1) / u, Q16 */
 
-    p = (uint16_t)(3012U - times(712, u));
-    p = (uint16_t)(7896U - times((int16_t)p, u));
-    p = (uint16_t)(32742U - times((int16_t)p, u));
-    p = times((int16_t)p, u);
+    p = (uint16_t)(3012U - mulu16_q(712, u));
+    p = (uint16_t)(7896U - mulu16_q(p, u));
+    p = (uint16_t)(32742U - mulu16_q(p, u));
+    p = mulu16_q(p, u);
     *length = larger + (larger >> 16) * p + (((larger & UINT32_C(0xFFFF)) * p + UINT32_C(0x8000)) >> 16);
     return angle;
 }
@@ -138,9 +133,9 @@ int32_t sin_q(uint32_t angle)
     x = (uint16_t)(up >> 14); /* quarters of a turn, Q16 */
     u = (uint16_t)(((uint32_t)x * x + x + 0x8000U) >> 16);
     /* sin(x) / x - 1, Q16 */
-    p = (uint16_t)(5206U - times(284, u));
-    p = (uint16_t)(42330U - times((int16_t)p, u));
-    p = (uint16_t)(37408U - (uint16_t)(((uint32_t)p * u + 0x8000U) >> 16));
+    p = (uint16_t)(5206U - mulu16_q(284, u));
+    p = (uint16_t)(42330U - mulu16_q(p, u));
+    p = (uint16_t)(37408U - mulu16_q(p, u));
     sine = (int32_t)up + mul32u16_q((int32_t)up, p);
     return (angle & UINT32_C(0x80000000)) != 0 ? -sine : sine;
 }

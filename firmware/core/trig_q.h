@@ -7,7 +7,7 @@
  *
  * Source: own; the polynomials were fitted by Lawson's reweighted least squares (Lawson 1961).
  * Error: measured by tests/firmware/test_trig_q.py, rounding to 2^-16 of a turn (0.0027 deg) included:
- *     atan2_q 0.0042 deg; atan2_q32 0.0017 deg; asin_q 0.0049 deg; sin_q 3e-5; angles_q 0.0046 deg
+ *     atan2_q 0.0042 deg; atan2_q32 0.0017 deg; asin_q 0.0055 deg; sin_q 3e-5; angles_q 0.0046 deg
  * Cost: AVR -Os, see firmware/budget.csv.
  *
  * What it does with bad input: every argument is allowed.  atan2 of (0, 0) is 0; asin of a sine beyond +-1 is
