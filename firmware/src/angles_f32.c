@@ -1,0 +1,1 @@
+#include "../core/angles_f32.c"

@@ -1,0 +1,1 @@
+#include "../core/calibration_q.c"

@@ -1,0 +1,1 @@
+#include "../core/fixed_q.c"

@@ -1,0 +1,1 @@
+#include "../core/trig_f32.c"

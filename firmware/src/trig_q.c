@@ -1,0 +1,1 @@
+#include "../core/trig_q.c"
