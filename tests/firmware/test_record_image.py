@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from factorlab.cli import main
-from factorlab.firmware.avr import live_avr
+from factorlab.firmware.avr import emulate_avr, live_avr
 from factorlab.firmware.emulation import mpu6050_counts
 from sequential.readers import read_imu
 from sequential.sensors import simulate_imu, tumble
@@ -54,3 +54,28 @@ def test_a_recording_of_the_board_goes_through_attitude(avr_image, avr_simulator
     recorded(avr_image(FILTER="none"), counts, avr_simulator, path)
     done = CliRunner().invoke(main, ["attitude", str(path), "--filter", "mahony", "--json"])
     assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize("mode", ["quaternion", "angles", "text"])
+def test_attitudes_are_those_of_the_same_image_run_ahead_of_time(
+    avr_image, avr_simulator, counts, tmp_path, mode
+):
+    path = tmp_path / "attitude.csv"
+    image = avr_image(FILTER="mahony_q")
+    told = recorded(image, counts, avr_simulator, path, "--mode", mode)
+    assert told["board"]["filter"] == "mahony_q"
+    rows = np.array(
+        [[float(cell) for cell in line.split(",")[:8]] for line in path.read_text().splitlines()[2:]]
+    )
+    frames = emulate_avr(image, counts, mode=mode[0], simulator=avr_simulator).frames
+    expected = {frame.t_us: frame for frame in frames if frame is not None}
+    # a line of text cannot say that the sensor is still starting
+    known = [(row, expected[t_us]) for row in rows if (t_us := round(row[0] * 1e6)) in expected]
+    assert len(known) >= len(rows) - 40
+    assert mode == "text" or len(known) == len(rows)
+    for row, frame in known:
+        if mode == "quaternion":
+            q = np.array(frame.world_q_body)
+            np.testing.assert_allclose(row[1:5], q / np.linalg.norm(q), atol=1e-8)
+        else:
+            np.testing.assert_allclose(row[5:8], np.degrees(frame.roll_pitch_yaw), atol=1e-4)
