@@ -174,31 +174,19 @@ static void learn(struct mahony_q_state *s, const struct mahony_q_derived *d, co
     }
 }
 
-/* The upper 24 bits of q times h: Q38. */
-static int64_t part(int32_t q, int16_t h)
-{
-    return (int64_t)(q >> 8) * h;
-}
-
-/* Q38 to Q30, rounded. */
-static int32_t narrowed(int64_t sum)
-{
-    return (int32_t)((sum + 0x80) >> 8);
-}
-
-/* q (x) (1, h), then times 1 + longer; h half angles, Q16; longer Q16. */
+/* q (x) (1, h), then times 1 + longer; h half angles, Q16; longer Q16: products of Q14 and Q16 are Q30. */
 static void turn(int32_t q[4], const int16_t h[3], int16_t longer)
 {
-    const int32_t w = q[0];
-    const int32_t x = q[1];
-    const int32_t y = q[2];
-    const int32_t z = q[3];
-    q[0] = plus_q(w, narrowed(-part(x, h[0]) - part(y, h[1]) - part(z, h[2])));
-    q[1] = plus_q(x, narrowed(part(w, h[0]) + part(y, h[2]) - part(z, h[1])));
-    q[2] = plus_q(y, narrowed(part(w, h[1]) + part(z, h[0]) - part(x, h[2])));
-    q[3] = plus_q(z, narrowed(part(w, h[2]) + part(x, h[1]) - part(y, h[0])));
+    const int16_t w = high16_q(q[0]);
+    const int16_t x = high16_q(q[1]);
+    const int16_t y = high16_q(q[2]);
+    const int16_t z = high16_q(q[3]);
+    q[0] = minus_q(minus_q(minus_q(q[0], mul16_q(x, h[0])), mul16_q(y, h[1])), mul16_q(z, h[2]));
+    q[1] = minus_q(plus_q(plus_q(q[1], mul16_q(w, h[0])), mul16_q(y, h[2])), mul16_q(z, h[1]));
+    q[2] = minus_q(plus_q(plus_q(q[2], mul16_q(w, h[1])), mul16_q(z, h[0])), mul16_q(x, h[2]));
+    q[3] = minus_q(plus_q(plus_q(q[3], mul16_q(w, h[2])), mul16_q(x, h[1])), mul16_q(y, h[0]));
     for (uint8_t i = 0; i < 4; i++) {
-        q[i] = plus_q(q[i], narrowed(part(q[i], longer)));
+        q[i] = plus_q(q[i], mul16_q(high16_q(q[i]), longer));
     }
 }
 
@@ -211,7 +199,7 @@ static void turn_by(struct mahony_q_state *s, const int32_t half[3], int16_t lon
         h[i] = high16_q(half[i]);
         squared += (uint32_t)mul16_q(h[i], h[i]);
     }
-    const uint16_t third = (uint16_t)(((squared >> 16) * 21845U) >> 16); /* |h|^2 / 3, Q16 */
+    const uint16_t third = (uint16_t)(((squared >> 16) * 21845U + 0x8000U) >> 16); /* |h|^2 / 3, Q16 */
     for (uint8_t i = 0; i < 3; i++) {
         uint32_t turned = (uint32_t)half[i] + (uint32_t)mul16u_q(h[i], third) + 0x80U;
         turned += (uint32_t)s->turn_left[i] << 8;
@@ -266,7 +254,7 @@ void mahony_q_step(struct mahony_q_state *s, const struct mahony_q_derived *d, c
         s->still = 0;
         s->status = MAHONY_Q_ACCEL_REJECTED;
     }
-    if (s->still > d->rest_periods) {
+    if (s->still >= d->rest_periods) {
         s->status |= MAHONY_Q_REST;
     }
     learn(s, d, e, periods);
