@@ -1,9 +1,7 @@
-/* Rotations in fixed point, see turning_q.h.  On an AVR turning_avr.S stands for this file. */
+/* Rotations in fixed point, see turning_q.h. */
 #include "turning_q.h"
 
 #include "fixed_q.h"
-
-#if !defined(__AVR__) || defined(FACTORLAB_PORTABLE)
 
 #define ONE_Q28 0x10000000L
 #define MENDED 0x1000 /* 1/16, Q16: what one turn mends of the length */
@@ -112,4 +110,3 @@ void turn_q(int32_t q[4], const int32_t half[3], uint8_t left[3], int16_t short_
     turn(q, h, (int16_t)(short_of - (int16_t)(squared >> 17)));
 }
 
-#endif

@@ -1,7 +1,7 @@
 /* What the fixed-point attitude filters do with a quaternion.
  *
  * Computes: the first two rows of the rotation matrix, vectors along them and back, directions, small turns.
- * On an AVR these are assembler (turning_avr.S), bit for bit the C of turning_q.c.
+ * 
  *
  * Source: own.
  * Cost: AVR, cycles: see the comment of each.
