@@ -11,6 +11,7 @@ from factorlab.cli.characterize import characterize
 from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
+from factorlab.cli.firmware import firmware
 from factorlab.cli.info import info
 from factorlab.cli.record import record
 from factorlab.cli.tune import tune
@@ -43,5 +44,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, characterize, calibrate, attitude, record, info, doctor):
+for command in (demo, compare, tune, characterize, calibrate, attitude, firmware, record, info, doctor):
     main.add_command(command)

@@ -15,6 +15,7 @@ __all__ = ["BARS", "Parity", "parity", "sampled"]
 
 Array = NDArray[np.float64]
 STEPS = 3000  # samples that are stepped one by one
+STEEP = np.radians(75.0)
 # largest difference of a step; root mean square and largest angle over a recording, degrees
 BARS = {"f32": (1e-6, 0.1, 0.3), "q": (None, 0.1, 0.3)}
 
@@ -67,6 +68,9 @@ class Parity:
 def parity(name: str, recording: ImuRecording, *, magnetometer: bool | None = None) -> Parity:
     """Run a C filter and its model on the same samples.
 
+    Of a filter of angles, what counts ends where the pitch comes near 90°: roll and yaw have no values there,
+    and a rounding decides over which side they fold.
+
     Parameters
     ----------
     name : such as "c-mahony"
@@ -83,12 +87,15 @@ def parity(name: str, recording: ImuRecording, *, magnetometer: bool | None = No
     from factorlab.attitude import make_estimator
 
     ported = replace(make_estimator(name), magnetometer=magnetometer)
-    model = replace(ported.reference, magnetometer=magnetometer)
+    used = recording.mag is not None and ported.magnetometer is not False
+    model = replace(ported.reference, magnetometer=used)
     own, theirs = ported.estimate(recording), model.estimate(recording)
     errors = attitude_error(own.world_q_body, theirs.world_q_body).errors[:, 0]
-    used = recording.mag is not None and magnetometer is not False
+    if model.name == "kalman":
+        steep = np.abs(theirs.roll_pitch_yaw()[:, 1]) > STEEP
+        errors = errors[: int(np.argmax(steep)) if steep.any() else None]
     step = None if name.endswith("-q") else _largest_step(ported, model, recording, used=used)
-    return Parity(name, recording.name, used, recording.seconds, np.degrees(errors), step)
+    return Parity(name, recording.name, used, recording.seconds[: len(errors)], np.degrees(errors), step)
 
 
 def _largest_step(ported: Any, model: Any, recording: ImuRecording, *, used: bool) -> float:

@@ -1,13 +1,19 @@
 """The filters of the firmware in Python: the same C sources, compiled for this machine."""
 
 from sequential.firmware.build import compile_core, library_path, source_folder
-from sequential.firmware.filters import FirmwareFilter
+from sequential.firmware.complementary import CComplementary
+from sequential.firmware.filters import FirmwareFilter, FixedPointFilter
 from sequential.firmware.library import load_library, missing
-from sequential.firmware.mahony import CMahony
+from sequential.firmware.mahony import CMahony, CMahonyFixed
+from sequential.firmware.tilt_kalman import CTiltKalman
 
 __all__ = [
+    "CComplementary",
     "CMahony",
+    "CMahonyFixed",
+    "CTiltKalman",
     "FirmwareFilter",
+    "FixedPointFilter",
     "compile_core",
     "library_path",
     "load_library",

@@ -11,12 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.attitude.estimator import NO_FIELD, AttitudeFilter, own_state, sample
 from sequential.attitude.history import AttitudeHistory
+from sequential.errors import ModelError
 from sequential.firmware import calls
 from sequential.sensors.recording import ImuRecording
 
-__all__ = ["FirmwareFilter"]
+__all__ = ["FirmwareFilter", "FixedPointFilter"]
 
 Array = NDArray[np.float64]
+RATES = 72, 1000  # Hz, that the fixed-point filters can count
+BOARD = 100.0  # Hz, of the boards
 
 
 @dataclass(frozen=True)
@@ -80,3 +83,30 @@ class FirmwareFilter(AttitudeFilter):
     def _rate(self, recording: ImuRecording | None) -> float:
         """Nominal rate, Hz; only fixed point counts in it."""
         return 0.0
+
+
+@dataclass(frozen=True)
+class FixedPointFilter(FirmwareFilter):
+    """A filter of firmware/core in fixed point, whose time is counted in periods.
+
+    Readings are quantised as on a board: gyro in Q24 rad/s, accelerometer and magnetometer in Q8 m/s² and µT
+    (saturating at 128).
+
+    Parameters
+    ----------
+    rate : nominal samples a second; None for those of the recording, or, sample by sample, 100
+    """
+
+    rate: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rate is not None and not RATES[0] <= self.rate <= RATES[1]:
+            raise ModelError(f"rate is {RATES[0]} to {RATES[1]} samples a second, got {self.rate}")
+
+    def _rate(self, recording: ImuRecording | None) -> float:
+        """A whole number, so that the periods of slow recordings are counted several at a time."""
+        rate = self.rate or (BOARD if recording is None or len(recording) < 2 else recording.rate)
+        while rate < RATES[0]:
+            rate *= 2.0
+        return float(round(min(rate, RATES[1])))

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, final
 
 from sequential.attitude.mahony import Mahony
-from sequential.firmware.filters import FirmwareFilter
+from sequential.firmware.filters import FirmwareFilter, FixedPointFilter
 
-__all__ = ["CMahony"]
+__all__ = ["CMahony", "CMahonyFixed"]
 
 
 @final
@@ -40,6 +40,47 @@ class CMahony(FirmwareFilter):
     def name(self) -> str:
         """c-mahony."""
         return "c-mahony"
+
+    @property
+    def reference(self) -> Mahony:
+        """The Python filter."""
+        return self.design
+
+
+@final
+@dataclass(frozen=True)
+class CMahonyFixed(FixedPointFilter):
+    """`Mahony` in fixed point: firmware/core/mahony_q.c, the same bits on this machine, an M4 and an AVR.
+
+    Parameters
+    ----------
+    magnetometer : it is not used: this is the 6-D filter
+    rate : nominal samples a second; None for those of the recording, or, sample by sample, 100
+    design : its settings; `heading_gain`, `heading_gate`, `heading_timeout` and `tilt_by_field` are not used,
+        and the order is 3
+
+    Notes
+    -----
+    State (n,) of `start` and `step`: the quaternion, then the C struct as it lies in memory.
+    """
+
+    design: Mahony = field(default_factory=Mahony)
+
+    ENTRY: ClassVar[str] = "mahony_q"
+    FIELDS: ClassVar[tuple[str, ...]] = (
+        "gain", "integral_gain", "bias_limit", "error_limit", "lasting_time", "start_gain", "start_time",
+        "rest_gyro", "rest_accel", "rest_time", "rest_constant",
+    )  # fmt: skip
+    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias", "rest")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "magnetometer", False)
+
+    @property
+    def name(self) -> str:
+        """c-mahony-q."""
+        return "c-mahony-q"
 
     @property
     def reference(self) -> Mahony:

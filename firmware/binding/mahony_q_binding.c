@@ -1,0 +1,77 @@
+/* Mahony's filter in fixed point, for Python: binding.h says how. */
+#include "fixed_binding.h"
+#include "mahony_q.h"
+
+#include <string.h>
+
+#define HEAD 4 /* doubles before the struct: the quaternion */
+#define BIAS_UNIT 4294967296.0 /* Q32 */
+
+/* struct mahony_q_settings holds floats only, in the order of Python's array. */
+static void derive(const double *p, double rate_hz, struct mahony_q_derived *derived)
+{
+    struct mahony_q_settings settings;
+    float fields[sizeof settings / sizeof(float)];
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
+        fields[i] = (float)p[i];
+    }
+    memcpy(&settings, fields, sizeof settings);
+    mahony_q_derive(&settings, (uint16_t)rate_hz, derived);
+}
+
+void binding_mahony_q_run(const double *settings, const struct recording *in, const struct answer *out)
+{
+    struct mahony_q_derived derived;
+    struct mahony_q_state state;
+    struct fixed_sample sample = fixed_row(in, 0);
+    derive(settings, in->rate_hz, &derived);
+    mahony_q_start(&state, &derived, &sample.imu);
+    for (int64_t k = 0; k < in->count; k++) {
+        int32_t q[4];
+        sample = fixed_row(in, k);
+        mahony_q_step(&state, &derived, &sample.imu, sample.periods);
+        mahony_q_attitude(&state, q);
+        store_q30(out->world_q_body, k, q);
+        for (int i = 0; i < 3; i++) {
+            out->bias[3 * k + i] = (double)state.bias[i] / BIAS_UNIT;
+        }
+        out->rest[k] = (state.status & MAHONY_Q_REST) != 0;
+    }
+}
+
+static void pack(const struct mahony_q_state *own, double *state)
+{
+    int32_t q[4];
+    mahony_q_attitude(own, q);
+    store_q30(state, 0, q);
+    memcpy(state + HEAD, own, sizeof *own);
+}
+
+int32_t binding_mahony_q_state_size(void)
+{
+    return (int32_t)(HEAD + (sizeof(struct mahony_q_state) + sizeof(double) - 1) / sizeof(double));
+}
+
+void binding_mahony_q_start(const double *settings, double rate_hz, const double sample[9], double *state)
+{
+    const struct fixed_sample first = fixed_sample(sample, sample + 3, sample + 6, 0.0, rate_hz);
+    struct mahony_q_derived derived;
+    struct mahony_q_state own;
+    derive(settings, rate_hz, &derived);
+    mahony_q_start(&own, &derived, &first.imu);
+    pack(&own, state);
+}
+
+/* A gyro that is no number leaves the state as it is. */
+void binding_mahony_q_step(const double *settings, double rate_hz, const double sample[9], double dt, double *state)
+{
+    const struct fixed_sample next = fixed_sample(sample, sample + 3, sample + 6, dt, rate_hz);
+    struct mahony_q_derived derived;
+    struct mahony_q_state own;
+    derive(settings, rate_hz, &derived);
+    memcpy(&own, state + HEAD, sizeof own);
+    if (next.usable) {
+        mahony_q_step(&own, &derived, &next.imu, next.periods);
+    }
+    pack(&own, state);
+}

@@ -1,1 +1,0 @@
-#include "../core/turning_q.c"

@@ -1,0 +1,60 @@
+"""The tilt Kalman filter of the firmware."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.attitude.tilt_kalman import TiltKalman
+from sequential.firmware.filters import FirmwareFilter
+
+__all__ = ["CTiltKalman"]
+
+FIELDS = ("gyro_density", "bias_walk", "tilt_sigma", "heading_sigma", "gate", "bias_sigma")
+
+
+def tilt_settings(design: TiltKalman) -> NDArray[np.float64]:
+    """In the order of the C struct, which takes the gate on the NIS, not its probability."""
+    gate = design.settings[4]
+    return np.array([gate if name == "gate" else float(getattr(design, name)) for name in FIELDS])
+
+
+@final
+@dataclass(frozen=True)
+class CTiltKalman(FirmwareFilter):
+    """`TiltKalman` in C, single precision: firmware/core/tilt_f32.c.
+
+    Parameters
+    ----------
+    magnetometer : use it for yaw or not; None where `design` says nothing and the recording has one
+    design : its settings
+
+    Notes
+    -----
+    State (19,) of `start` and `step`: that of `TiltKalman`, which begins with angles; the last three numbers,
+    rates of the last step, are 0.
+    """
+
+    design: TiltKalman = field(default_factory=TiltKalman)
+
+    ENTRY: ClassVar[str] = "tilt_f32"
+    FIELDS: ClassVar[tuple[str, ...]] = FIELDS
+    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias")
+
+    @property
+    def name(self) -> str:
+        """c-kalman."""
+        return "c-kalman"
+
+    @property
+    def reference(self) -> TiltKalman:
+        """The Python filter."""
+        return self.design
+
+    @property
+    def settings(self) -> NDArray[np.float64]:
+        """What the C struct of the settings holds, in its order."""
+        return tilt_settings(self.design)
