@@ -23,16 +23,13 @@ struct cmsdk_uart {
     volatile uint32_t divider;   /* clocks a bit, at least 16 */
 };
 
-struct systick {
-    volatile uint32_t ctrl;  /* bit 0: count, bit 1: interrupt, bit 2: processor clock, bit 16: reached zero */
-    volatile uint32_t load;  /* clocks a period, less one */
-    volatile uint32_t value; /* counts down */
-};
-
 #define TIMER0 ((struct cmsdk_timer *)0x40000000UL)
 #define UART0 ((struct cmsdk_uart *)0x40004000UL)
-#define SYSTICK ((struct systick *)0xE000E010UL)
-#define NVIC_ENABLE ((volatile uint32_t *)0xE000E100UL) /* a bit an interrupt */
+
+#define UART_BUFFER_FULL 1U    /* of `state`, transmit */
+#define UART_BUFFER_HELD 2U    /* of `state`, receive */
+#define UART_INTERRUPT_BOTH 3U /* of `interrupt` */
+#define UART_RUN 0xFU          /* of `ctrl`: both ways, both interrupts */
 
 #define UART0_RX_IRQ 0
 #define UART0_TX_IRQ 1

@@ -39,26 +39,45 @@ static size_t word(const char *line, unsigned index, const char **start)
     return (size_t)(line - *start);
 }
 
-int32_t semihost_open(unsigned argument, enum semihost_mode mode)
+/* The command line in memory of ours; the word ends with a zero. */
+static size_t argument_word(unsigned argument, const char **start)
 {
     static char line[COMMAND_LINE_MAX];
     const struct {
         char *buffer;
         uint32_t size; /* bytes */
     } into = {line, sizeof line};
-    struct {
+    if (call(SYS_GET_CMDLINE, &into) != 0) {
+        return 0;
+    }
+    const size_t length = word(line, argument, start);
+    line[(size_t)(*start - line) + length] = '\0';
+    return length;
+}
+
+size_t semihost_argument(unsigned argument, char *into, size_t size)
+{
+    const char *start;
+    size_t length = argument_word(argument, &start);
+    length = length < size ? length : size;
+    for (size_t k = 0; k < length; k++) {
+        into[k] = start[k];
+    }
+    return length;
+}
+
+int32_t semihost_open(unsigned argument, enum semihost_mode mode)
+{
+    const char *name;
+    const size_t length = argument_word(argument, &name);
+    const struct {
         const char *name;
         uint32_t mode;
         uint32_t length; /* bytes */
-    } open = {line, (uint32_t)mode, 0};
-    if (call(SYS_GET_CMDLINE, &into) != 0) {
+    } open = {name, (uint32_t)mode, (uint32_t)length};
+    if (length == 0) {
         return -1;
     }
-    open.length = (uint32_t)word(line, argument, &open.name);
-    if (open.length == 0) {
-        return -1;
-    }
-    line[(size_t)(open.name - line) + open.length] = '\0';
     const int32_t file = call(SYS_OPEN, &open);
     if (file < 0) {
         semihost_exit(1);

@@ -15,6 +15,9 @@ enum semihost_mode { SEMIHOST_READ = 1 /* rb */, SEMIHOST_WRITE = 5 /* wb */ };
 /* A file, by its place among the arguments (0 is the program's name); a missing argument gives -1. */
 int32_t semihost_open(unsigned argument, enum semihost_mode mode);
 
+/* Copies up to `size` characters of an argument; how many there were to copy, 0 for a missing argument. */
+size_t semihost_argument(unsigned argument, char *into, size_t size);
+
 /* Bytes read: less than asked for at the end of the file. */
 size_t semihost_read(int32_t file, void *into, size_t size);
 
