@@ -20,15 +20,19 @@
 #define LOG 2U
 #define COMMAND 3U
 #define BAUD 115200UL
+#define PAINT 0xA5A5A5A5UL
+#define STACK_WATCHED 8192U /* bytes */
+#define STACK_MARGIN 128U   /* bytes in use while it is painted */
 
 struct board {
     struct ring out, in;
     struct log_period *log;
     uint32_t ticks;             /* periods since the start, the present one included */
     uint32_t taken;             /* of these, given to the application */
+    uint32_t sent;              /* bytes handed to the UART */
     int32_t rows;               /* file of the recording */
     volatile uint8_t events;    /* BOARD_TICK ... */
-    volatile uint8_t first_due; /* 1: the next byte that leaves is the first since the sample */
+    volatile uint8_t first_due; /* 1: no byte has left in this period */
     uint8_t transfer;           /* BOARD_I2C_DONE ... */
 };
 
@@ -70,6 +74,7 @@ static void uart_handler(void)
             board.first_due = 0;
         }
         UART0->data = (uint32_t)ring_take(&board.out);
+        board.sent++;
     }
 }
 
@@ -78,11 +83,26 @@ static void tick_handler(void)
     board.ticks++;
     board.log = log_next();
     board.log->tick = now();
+    board.log->sent = board.sent;
+    board.first_due = 1;
     board.events |= BOARD_TICK;
+}
+
+/* What was painted and is no more. */
+static uint32_t stack_used(void)
+{
+    const uint32_t *low = (const uint32_t *)(const void *)stack_top - STACK_WATCHED / sizeof *low;
+    while (*low == PAINT) {
+        low++;
+    }
+    return (uint32_t)(stack_top - (const unsigned char *)low);
 }
 
 static void finish(void)
 {
+    board.log = log_next();
+    board.log->row = LOG_STACK;
+    board.log->tick = stack_used();
     log_flush();
     semihost_exit(0);
 }
@@ -109,9 +129,19 @@ static void log_empty(void)
     board_mark_update(0);
 }
 
+static void paint_stack(void)
+{
+    volatile uint32_t *low = (volatile uint32_t *)(void *)stack_top - STACK_WATCHED / sizeof *low;
+    const volatile uint32_t *high = (volatile uint32_t *)(void *)stack_top - STACK_MARGIN / sizeof *low;
+    while (low < high) {
+        *low++ = PAINT;
+    }
+}
+
 void board_start(void)
 {
     char command = '\0';
+    paint_stack();
     TIMER0->reload = UINT32_MAX;
     TIMER0->value = UINT32_MAX;
     TIMER0->ctrl = 1;
@@ -189,11 +219,10 @@ void board_i2c_start(uint8_t address, const uint8_t *write, uint8_t write_length
     if (board.transfer == BOARD_I2C_BUSY) {
         return;
     }
-    raise_event(BOARD_I2C);
     if (board.transfer == BOARD_I2C_DONE) {
-        board.first_due = 1;
         board.log->sample = now();
     }
+    raise_event(BOARD_I2C);
 }
 
 uint8_t board_i2c_state(void)

@@ -1,0 +1,90 @@
+"""Rows of a recording as the emulated Cortex-M4 and the host read them, and the host itself."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from factorlab.firmware.emulation import COMMANDS
+from factorlab.firmware.toolchain import firmware_folder, run_tool
+from sequential.errors import DataError, ShapeError
+
+__all__ = ["FAULTS", "ROW", "build_host", "recorded_rows", "run_host"]
+
+ROW = np.dtype([("counts", "<i2", 7), ("answer", "u1"), ("command", "u1")])
+FAULTS = {"good": 0, "absent": 1, "hung": 2, "bus": 3}
+
+
+def recorded_rows(counts: ArrayLike, *, mode: str, faults: ArrayLike | None = None) -> NDArray[np.void]:
+    """(N,) rows of firmware/ports/recorded/sensor.h.
+
+    Parameters
+    ----------
+    counts : (N, 7) int16 rows ax ay az temperature gx gy gz
+    mode : `q`, `a`, `r` or `t`
+    faults : (N,) of `FAULTS`: the sensor answers, does not acknowledge, holds the clock for ever, or the bus
+        fails
+
+    Raises
+    ------
+    ShapeError, DataError
+        where they are something else.
+    """
+    given = np.asarray(counts)
+    if given.ndim != 2 or given.shape[1] != 7 or not len(given):
+        raise ShapeError(f"counts must be (N, 7), ax ay az temperature gx gy gz; got {given.shape}")
+    if not np.issubdtype(given.dtype, np.integer) or given.min() < -32768 or given.max() > 32767:
+        raise DataError(f"counts must be integers of 16 bits, got {given.dtype}")
+    if mode not in COMMANDS:
+        raise DataError(f"mode {mode!r} is none of {', '.join(COMMANDS)} ({', '.join(COMMANDS.values())})")
+    rows = np.zeros(len(given), ROW)
+    rows["counts"] = given
+    if faults is not None:
+        kinds = np.asarray(faults)
+        if kinds.shape != (len(given),) or not np.isin(kinds, list(FAULTS.values())).all():
+            raise ShapeError(f"faults must be ({len(given)},) of 0 to 3, one a row; got {kinds.shape}")
+        rows["answer"] = kinds
+    return rows
+
+
+def build_host(out: Path, *, filter: str = "mahony_q", calibration: Path | None = None) -> Path:  # noqa: A002
+    """Compile the application for this computer into the folder `out`; the program.
+
+    Parameters
+    ----------
+    out : folder
+    filter : of firmware/app/filter_*.c
+    calibration : header of constants, as `factorlab calibrate … --c-header` writes them
+
+    Raises
+    ------
+    ToolMissingError
+        where make or a compiler is missing, or refuses.
+    """
+    asked = [f"OUT={out.resolve()}", f"FILTER={filter}", f"CALIBRATION={calibration or ''}"]
+    run_tool(
+        ["make", "-C", str(firmware_folder() / "ports" / "host"), *asked],
+        what=f"compiling {filter} for this computer",
+    )
+    return out / "firmware"
+
+
+def run_host(program: Path, counts: ArrayLike, *, mode: str = "q", faults: ArrayLike | None = None) -> bytes:
+    """Every byte that the application writes on this computer, given these samples.
+
+    On an emulated board it writes the same, but for the name of the target in its boot frame.
+
+    Raises
+    ------
+    ShapeError, DataError
+        as `recorded_rows`.
+    """
+    rows = recorded_rows(counts, mode=mode, faults=faults)
+    with tempfile.TemporaryDirectory() as name:
+        source, sink = Path(name) / "rows", Path(name) / "bytes"
+        rows.tofile(source)
+        run_tool([str(program.resolve()), str(source), str(sink), mode], what=f"running {program.name}")
+        return sink.read_bytes()
