@@ -82,7 +82,7 @@ def _times(periods: Periods, empty: np.void, size: int, count: int) -> tuple[Flo
 
     def after_tick(name: str) -> Floats:
         passed = _instructions(periods["tick"], periods[name])
-        return np.where(periods[name] > 0, begin + passed / CLOCK_HZ, np.nan)
+        return np.asarray(np.where(periods[name] > 0, begin + passed / CLOCK_HZ, np.nan), np.float64)
 
     first, sample = after_tick("first_byte"), after_tick("sample")
     taken = _instructions(empty["update_start"], empty["update_end"])
@@ -113,8 +113,8 @@ def _instructions(start: NDArray[np.uint32], end: NDArray[np.uint32], shift: int
 def tick_periods(image: Path, counts: ArrayLike, *, shift: int = 0) -> NDArray[np.int64]:
     """Run an image that was built with CLOCK=systick; the (P,) clocks of 25 MHz between its ticks.
 
-    The tick interrupts whatever runs; a period of 100 Hz is 250 000 clocks.  This takes QEMU 2^24 instructions
-    and more a period: some 20 periods a second.
+    The tick interrupts whatever runs; a period of 100 Hz is 250 000 clocks.  QEMU waits ten million
+    instructions a period (half as many for each `shift`): some 20 periods a second.
 
     Parameters
     ----------
@@ -129,7 +129,8 @@ def tick_periods(image: Path, counts: ArrayLike, *, shift: int = 0) -> NDArray[n
     """
     rows = recorded_rows(counts, mode="q")
     _, log = run_mps2(image, rows, command="q", shift=shift)
-    return np.diff(log["tick"][log["row"] > EMPTY].astype(np.int64))
+    ticks: NDArray[np.int64] = log["tick"][log["row"] > EMPTY].astype(np.int64)
+    return ticks[1:] - ticks[:-1]
 
 
 def run_mps2(image: Path, rows: NDArray[np.void], *, command: str, shift: int) -> tuple[bytes, Periods]:
@@ -159,6 +160,6 @@ def run_mps2(image: Path, rows: NDArray[np.void], *, command: str, shift: int) -
         data, log = (folder / "bytes").read_bytes(), np.fromfile(folder / "log", PERIOD)
     if not len(log) or log["row"][-1] != STACK:
         raise SolverError(
-            f"{image.name} ended after {len(log)} periods of {len(rows)} and more: build it anew, with BOARD=qemu"
+            f"{image.name} stopped after {len(log)} of {len(rows)} periods; build it anew with BOARD=qemu"
         )
     return data, log

@@ -16,7 +16,7 @@
 
 struct board {
     FILE *rows, *bytes;
-    uint32_t periods; /* since the start, the present one included */
+    uint32_t periods; /* since the start, as the application knows them */
     uint8_t events;   /* BOARD_TICK ... */
     uint8_t transfer; /* BOARD_I2C_DONE ... */
     int16_t received; /* the one byte waiting, -1: none */
@@ -44,7 +44,6 @@ void board_start(void)
 uint8_t board_wait(void)
 {
     if (board.events == 0U) {
-        board.periods++;
         board.events = BOARD_TICK;
         if (recorded_tick() == 0) {
             exit(fclose(board.bytes) == 0 ? EXIT_SUCCESS : EXIT_FAILURE);
@@ -60,6 +59,7 @@ uint8_t board_wait(void)
 
 uint8_t board_periods(void)
 {
+    board.periods++;
     return 1;
 }
 

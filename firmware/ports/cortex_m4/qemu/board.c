@@ -21,8 +21,7 @@
 #define COMMAND 3U
 #define BAUD 115200UL
 #define PAINT 0xA5A5A5A5UL
-#define STACK_WATCHED 8192U /* bytes */
-#define STACK_MARGIN 128U   /* bytes in use while it is painted */
+#define STACK_MARGIN 16 /* words left alone while it is painted */
 
 struct board {
     struct ring out, in;
@@ -35,6 +34,8 @@ struct board {
     volatile uint8_t first_due; /* 1: no byte has left in this period */
     uint8_t transfer;           /* BOARD_I2C_DONE ... */
 };
+
+extern uint32_t stack_watched[]; /* of the linker script: where the paint begins */
 
 const uint8_t board_target = BOOT_MPS2_AN386;
 static struct board board;
@@ -80,9 +81,10 @@ static void uart_handler(void)
 
 static void tick_handler(void)
 {
+    const uint32_t at = now();
     board.ticks++;
     board.log = log_next();
-    board.log->tick = now();
+    board.log->tick = at;
     board.log->sent = board.sent;
     board.first_due = 1;
     board.events |= BOARD_TICK;
@@ -91,7 +93,7 @@ static void tick_handler(void)
 /* What was painted and is no more. */
 static uint32_t stack_used(void)
 {
-    const uint32_t *low = (const uint32_t *)(const void *)stack_top - STACK_WATCHED / sizeof *low;
+    const uint32_t *low = stack_watched;
     while (*low == PAINT) {
         low++;
     }
@@ -131,10 +133,9 @@ static void log_empty(void)
 
 static void paint_stack(void)
 {
-    volatile uint32_t *low = (volatile uint32_t *)(void *)stack_top - STACK_WATCHED / sizeof *low;
-    const volatile uint32_t *high = (volatile uint32_t *)(void *)stack_top - STACK_MARGIN / sizeof *low;
-    while (low < high) {
-        *low++ = PAINT;
+    const uint32_t *end = (const uint32_t *)__builtin_frame_address(0) - STACK_MARGIN;
+    for (uint32_t *low = stack_watched; low < end; low++) {
+        *low = PAINT;
     }
 }
 
@@ -179,19 +180,17 @@ static void begin_period(void)
 
 uint8_t board_wait(void)
 {
-    for (;;) {
-        interrupts_off();
-        const uint8_t events = board.events;
-        board.events = 0;
-        interrupts_on();
-        if ((events & BOARD_TICK) != 0U) {
-            begin_period();
-        }
-        if (events != 0U) {
-            return events;
-        }
+    while (board.events == 0U) {
         idle();
     }
+    interrupts_off();
+    const uint8_t events = board.events;
+    board.events = 0;
+    interrupts_on();
+    if ((events & BOARD_TICK) != 0U) {
+        begin_period();
+    }
+    return events;
 }
 
 uint8_t board_periods(void)

@@ -1,0 +1,91 @@
+"""The application on recordings: this computer, Cortex-M4 and AVR write the same bytes."""
+
+import numpy as np
+import pytest
+
+from factorlab.datasets.recordings import open_recording
+from factorlab.firmware.avr import emulate_avr
+from factorlab.firmware.emulation import mpu6050_counts
+from factorlab.firmware.m4 import emulate_m4
+from factorlab.firmware.recorded import FAULTS, run_host
+from sequential.readers.serial import Status, decode
+
+RECORDINGS = ("broad:07", "broad:16", "broad:21", "broad:34", "broad:01", "broad:29")
+MANY, FEW = 100_000, 20_000
+TARGET, CHECK = 12, slice(24, 26)  # of the boot frame, which comes first
+
+
+@pytest.fixture(scope="session")
+def recorded_counts(data_dir):
+    """Recordings one after the other: where one begins, the filter meets a jump."""
+    return np.concatenate([mpu6050_counts(open_recording(name).recording) for name in RECORDINGS])
+
+
+def bad_input(rng):
+    """What a sensor may say when all goes wrong, with faults of the bus between."""
+    quiet = np.tile([0, 0, 4096, 0, 0, 0, 0], (200, 1)) + rng.integers(-3, 4, (200, 7))
+    free_fall = np.zeros((200, 7), int) + rng.integers(-1, 2, (200, 7))
+    spinning = quiet + np.array([0, 0, 0, 0, 32767, -32768, 32767])
+    saturated = quiet + np.array([32767, -32768, 32767, 0, 0, 0, 0])
+    stuck_gyro = np.where([1, 1, 1, 1, 0, 0, 0], quiet, [0, 0, 0, 0, 300, -300, 300])
+    noise = rng.integers(-32768, 32768, (400, 7))
+    zero = np.zeros((60, 7), int)
+    rows = np.concatenate([quiet, free_fall, spinning, saturated, stuck_gyro, noise, zero, quiet, -quiet])
+    faults = np.where(rng.random(len(rows)) < 0.2, rng.integers(1, 4, len(rows)), 0)
+    faults[:20] = 0
+    faults[500:650] = FAULTS["absent"]
+    return np.clip(rows, -32768, 32767), faults
+
+
+def assert_same_bytes(board, host):
+    """All but the name of the target in the boot frame, and its check."""
+    ours, theirs = np.frombuffer(board, np.uint8).copy(), np.frombuffer(host, np.uint8).copy()
+    for data in (ours, theirs):
+        data[TARGET] = 0
+        data[CHECK] = 0
+    np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["mahony_q", "mahony_f32"])
+def test_m4_writes_what_the_host_writes(m4_image, qemu, host_program, recorded_counts, name, pytestconfig):
+    counts = recorded_counts[: MANY if pytestconfig.getoption("--full") else FEW]
+    emulation = emulate_m4(m4_image(FILTER=name), counts)
+    assert emulation.lost == emulation.corrupt == 0
+    assert not emulation.missing.any()
+    assert_same_bytes(emulation.data, run_host(host_program(name), counts))
+
+
+@pytest.mark.parametrize("mode", ["a", "t", "r"])
+def test_every_mode_is_the_same(m4_image, qemu, host_program, recorded_counts, mode):
+    counts = recorded_counts[:3000]
+    emulation = emulate_m4(m4_image(FILTER="mahony_q"), counts, mode=mode)
+    assert_same_bytes(emulation.data, run_host(host_program("mahony_q"), counts, mode=mode))
+
+
+@pytest.mark.parametrize("name", ["mahony_q", "mahony_f32"])
+@pytest.mark.parametrize("mode", ["q", "a"])
+def test_bad_input_is_met_in_the_same_way(m4_image, qemu, host_program, rng, name, mode):
+    counts, faults = bad_input(rng)
+    emulation = emulate_m4(m4_image(FILTER=name), counts, mode=mode, faults=faults)
+    assert emulation.lost == emulation.corrupt == 0
+    host = run_host(host_program(name), counts, mode=mode, faults=faults)
+    assert_same_bytes(emulation.data, host)
+    assert emulation.missing[500:650].all()
+    assert emulation.has(Status.SATURATED).any()
+    if mode == "q":
+        np.testing.assert_allclose(np.linalg.norm(emulation.world_q_body, axis=1), 1.0, atol=0.03)
+
+
+def test_three_machines_send_the_same_frames(
+    m4_image, qemu, host_program, avr_image, avr_simulator, recorded_counts
+):
+    counts = recorded_counts[:2000]
+    avr = emulate_avr(avr_image(FILTER="mahony_q"), counts, simulator=avr_simulator)
+    m4 = emulate_m4(m4_image(FILTER="mahony_q"), counts)
+    host = [one for one in decode(run_host(host_program("mahony_q"), counts)) if hasattr(one, "world_q_body")]
+    assert avr.lost == m4.lost == 0
+    np.testing.assert_array_equal(avr.world_q_body, m4.world_q_body)
+    np.testing.assert_array_equal(m4.world_q_body, [one.world_q_body for one in host[-len(counts) :]])
+    assert [one.bias for one in avr.frames] == [one.bias for one in m4.frames]
+    assert [one.status for one in avr.frames] == [one.status for one in m4.frames]
