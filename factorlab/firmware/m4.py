@@ -98,7 +98,9 @@ def _times(periods: Periods, empty: np.void, size: int, count: int) -> tuple[Flo
 def _on_the_line(periods: Periods, first: Floats, size: int) -> Floats:
     """(B,) when bytes leave: those of a period one after the other, at the line's rate."""
     sent = np.append(periods["sent"], size).astype(np.int64)
-    byte_s = np.arange(size) * (10.0 / BAUD)  # what leaves before the first period, the boot frame
+    byte_s: Floats = np.arange(size, dtype=np.float64) * (
+        10.0 / BAUD
+    )  # what leaves before the first period, the boot frame
     for start, begin, end in zip(first, sent[:-1], sent[1:], strict=True):
         byte_s[begin:end] = start + np.arange(end - begin) * (10.0 / BAUD)
     return byte_s
