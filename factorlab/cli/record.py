@@ -8,12 +8,15 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from factorlab.cli.faults import DATA_ERROR, in_one_sentence
 from factorlab.cli.settings import as_json, config_option, print_json
+
+if TYPE_CHECKING:
+    from factorlab.live import Recorded
 
 __all__ = ["record"]
 
@@ -56,6 +59,12 @@ def record() -> None:
     metavar="S",
     help="For a first frame.",
 )
+@click.option(
+    "--calibration",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="calibration.json that the board should have been built with.",
+)
 @click.option("--force", is_flag=True, help="Replace a file that is there.")
 @as_json
 @config_option
@@ -78,15 +87,30 @@ def serial(port: str, out: Path, as_json: bool, **options: Any) -> int:
     else:
         for text in recorded.lines():
             click.echo(text)
-    if recorded.mode == "raw" and recorded.board is None:
-        click.echo(
-            "warn: the board did not say its full scales, so the file holds counts; "
-            "read_imu and --units take them, as in --units accel=±8 g",
-            err=True,
-        )
+    for warning in _warnings(recorded, options["calibration"]):
+        click.echo(f"warn: {warning}", err=True)
     if recorded.ended:
         click.echo(f"error: {recorded.ended}; what came before is in {recorded.path}", err=True)
     return DATA_ERROR if recorded.ended else 0
+
+
+def _warnings(recorded: Recorded, calibration: Path | None) -> Iterator[str]:
+    """What the boot frame, or its absence, means for the recording."""
+    if recorded.board is None:
+        if recorded.mode == "raw":
+            yield (
+                "the board did not say its full scales, so the file holds counts; read_imu and --units take "
+                "them, as in --units 'accel=±8 g,gyro=±2000 dps'"
+            )
+        return
+    if calibration is not None:
+        from sequential.sensors import ImuCalibration
+        from sequential.sensors.calibration_header import calibration_hash
+
+        built, wanted = recorded.board.calibration_hash, calibration_hash(ImuCalibration.load(calibration))
+        if built != wanted:
+            has = f"calibration {built:08x}" if built else "no calibration"
+            yield f"the board was built with {has}, {calibration} is {wanted:08x}; build and flash it anew"
 
 
 @contextmanager

@@ -94,7 +94,7 @@ def described(boot: BootFrame | None) -> str:
     """What a board said of itself, on one line."""
     if boot is None:
         return "a board that did not say what it is"
-    hashed = f"calibration {boot.calibration_hash:#010x}" if boot.calibration_hash else "no calibration"
+    hashed = f"calibration {boot.calibration_hash:08x}" if boot.calibration_hash else "no calibration"
     version = ".".join(map(str, boot.version))
     return (
         f"{boot.target}, firmware {version}, filter {boot.filter}, {hashed}, {boot.rate} Hz, {boot.sensor} "

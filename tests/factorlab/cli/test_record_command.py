@@ -1,6 +1,7 @@
 """`factorlab record serial`, with a board played by a thread on a pseudo-terminal."""
 
 import errno
+import hashlib
 import json
 import math
 import signal
@@ -17,6 +18,7 @@ from serial_board import Board, attitude, counts, encoders
 from factorlab.cli import main
 from factorlab.live import SerialPort
 from sequential.readers import read_imu, read_tum
+from sequential.sensors.calibration_header import nominal_calibration
 
 SCALES = np.array([8 * 9.80665 / 32768] * 3 + [math.radians(2000) / 32768] * 3)
 FAST = 0.0005
@@ -215,6 +217,17 @@ def test_a_port_without_permission_says_which_group_has_it(monkeypatch, tmp_path
     done = record(tmp_path, tmp_path / "imu.csv")
     assert done.exit_code == 1
     assert f"sudo usermod -aG {tmp_path.group()} $USER" in done.stderr
+
+
+def test_a_board_built_with_another_calibration_is_told(core, tmp_path):
+    calibration = tmp_path / "calibration.json"
+    nominal_calibration().save(calibration)
+    with Board(core, pause_s=FAST) as board:
+        options = "--seconds", "0.3", "--calibration", str(calibration)
+        done = record(board.port, tmp_path / "imu.csv", *options)
+    assert done.exit_code == 0
+    expected = hashlib.sha256(calibration.read_bytes()).hexdigest()[:8]
+    assert f"built with calibration cafe0123, {calibration} is {expected}" in done.stderr
 
 
 def test_a_file_that_is_there_is_kept(core, tmp_path):
