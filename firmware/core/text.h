@@ -4,7 +4,7 @@
  * whole milliseconds, angles are in degrees with two decimals, hh is the exclusive or of the characters
  * between $ and * in two hexadecimal digits (as in NMEA 0183).
  *     $ATT,41,410,-0.35,12.07,179.99*53
- * Cost: AVR -Os, 4 466 cycles at worst (long numbers), 550 bytes of flash.
+ * Cost: AVR -O2, 3 985 cycles at worst (long numbers), 0.9 kB of flash.
  * Source: own. Degrees are the angle times 36000 / 65536 = 1125 / 2048, rounded to nearest, halves away from
  * zero; decimal digits come from counting down powers of ten: an AVR has no divider.
  *

@@ -1,0 +1,1 @@
+#include "../core/turning_q.c"
