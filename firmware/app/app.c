@@ -18,6 +18,7 @@ struct app {
     uint16_t sequence; /* number of the next frame */
     uint8_t mode;      /* COMMAND_QUATERNION, COMMAND_ANGLES, COMMAND_RAW, COMMAND_TEXT */
     uint8_t due;       /* 1: this period has not had its frame yet */
+    uint8_t prepared;  /* 1: the filter has the accelerometer of this period */
     uint8_t periods;   /* since the last sample, at most 255 */
     uint8_t overrun;   /* FRAME_OVERRUN: a frame was dropped since one was sent */
 };
@@ -166,8 +167,11 @@ static void take(uint8_t answer)
         }
         return;
     }
+    if (app.prepared == 0U) {
+        filter_accel(app.sensor.counts);
+    }
     board_mark_update(1);
-    filter_update(app.sensor.counts, app.periods);
+    filter_update(app.sensor.counts + MPU6050_GYRO, app.periods);
     board_mark_update(0);
     app.periods = 0;
     report((uint8_t)(filter_status() | (answer == MPU6050_SATURATED ? FRAME_SATURATED : 0U)));
@@ -183,6 +187,7 @@ static void tick(void)
     app.sequence = (uint16_t)(app.sequence + periods - 1U);
     app.periods = (uint8_t)(periods > UINT8_MAX - app.periods ? UINT8_MAX : app.periods + periods);
     app.due = 1;
+    app.prepared = 0;
     take(mpu6050_tick(&app.sensor));
 }
 
@@ -196,7 +201,11 @@ void app_start(void)
 
 void app_step(uint8_t events)
 {
-    if ((events & BOARD_I2C) != 0U) { /* first: with a tick beside it, it belongs to the period before */
+    if ((events & BOARD_I2C_PART) != 0U && mpu6050_part(&app.sensor) != 0U) {
+        filter_accel(app.sensor.counts);
+        app.prepared = 1;
+    }
+    if ((events & BOARD_I2C) != 0U) { /* before the tick: with a tick beside it, it belongs to the period before */
         take(mpu6050_transferred(&app.sensor));
     }
     if ((events & BOARD_TICK) != 0U) {

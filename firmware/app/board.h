@@ -28,6 +28,9 @@ extern "C" {
 #define BOARD_TICK 0x01U     /* a period has begun */
 #define BOARD_I2C 0x02U      /* the transfer has ended */
 #define BOARD_RECEIVED 0x04U /* bytes have come on the serial line */
+#define BOARD_I2C_PART 0x08U /* BOARD_PART bytes of the transfer have been read; a board may never say so */
+
+#define BOARD_PART 6U /* bytes: of a sample, the accelerometer's, which can be worked on while the rest comes */
 
 /* How a transfer stands. */
 #define BOARD_I2C_DONE 0U

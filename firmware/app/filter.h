@@ -18,8 +18,10 @@ extern const uint32_t filter_calibration_hash; /* first 4 bytes of the SHA-256 o
 /* Constants from settings; the attitude is the identity until the first sample. */
 void filter_start(void);
 
-/* One sample, `periods` after the one before; the first aligns the filter. */
-void filter_update(const int16_t counts[7] /* ax ay az temperature gx gy gz */, uint8_t periods);
+/* One sample in two calls: its accelerometer, as soon as that is known, then its gyro, with which the filter is
+ * updated, `periods` after the sample before; the first aligns the filter. */
+void filter_accel(const int16_t accel[3] /* counts */);
+void filter_update(const int16_t gyro[3] /* counts */, uint8_t periods);
 
 void filter_attitude(int32_t world_q_body[4] /* Q30 */);
 void filter_bias(int32_t bias[3] /* rad/s, Q24 */);

@@ -9,6 +9,7 @@ const uint32_t filter_calibration_hash = FACTORLAB_CALIBRATION_HASH;
 
 static struct mahony_f32_derived derived;
 static struct mahony_f32_state state;
+static struct imu_f32 sample;
 static uint8_t started; /* 1: a first sample has come */
 
 void filter_start(void)
@@ -19,10 +20,14 @@ void filter_start(void)
     started = 0;
 }
 
-void filter_update(const int16_t counts[7], uint8_t periods)
+void filter_accel(const int16_t accel[3])
 {
-    struct imu_f32 sample;
-    sample_f32(counts, &sample);
+    sample_accel_f32(accel, &sample);
+}
+
+void filter_update(const int16_t gyro[3], uint8_t periods)
+{
+    sample_gyro_f32(gyro, &sample);
     if (started == 0U) {
         started = 1;
         periods = 0;

@@ -9,6 +9,7 @@ const uint8_t filter_kind = BOOT_MAHONY_Q;
 const uint32_t filter_calibration_hash = FACTORLAB_CALIBRATION_HASH;
 
 static struct mahony_q_state state;
+static struct imu_q sample;
 static uint8_t started; /* 1: a first sample has come */
 
 void filter_start(void)
@@ -16,10 +17,14 @@ void filter_start(void)
     started = 0;
 }
 
-void filter_update(const int16_t counts[7], uint8_t periods)
+void filter_accel(const int16_t accel[3])
 {
-    struct imu_q sample;
-    sample_q(counts, &sample);
+    sample_accel_q(accel, &sample);
+}
+
+void filter_update(const int16_t gyro[3], uint8_t periods)
+{
+    sample_gyro_q(gyro, &sample);
     if (started == 0U) {
         started = 1;
         periods = 0;

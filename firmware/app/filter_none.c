@@ -10,9 +10,14 @@ void filter_start(void)
 {
 }
 
-void filter_update(const int16_t counts[7], uint8_t periods)
+void filter_accel(const int16_t accel[3])
 {
-    (void)counts;
+    (void)accel;
+}
+
+void filter_update(const int16_t gyro[3], uint8_t periods)
+{
+    (void)gyro;
     (void)periods;
 }
 

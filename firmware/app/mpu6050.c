@@ -65,6 +65,7 @@ static void begin(struct mpu6050 *sensor)
         transfer(sensor, RATE_DIVIDER, 0, sizeof configuration);
         break;
     default:
+        sensor->known = sensor->changed = sensor->saturated = 0;
         transfer(sensor, FIRST_COUNT, 0, MPU6050_BURST);
         break;
     }
@@ -118,29 +119,43 @@ static uint8_t repeated(struct mpu6050 *sensor)
     return sensor->equal < MPU6050_STUCK ? MPU6050_SAMPLE : MPU6050_NOTHING;
 }
 
-/* One pass over the bytes: this is the time between a sample in memory and its update. */
-static uint8_t sample(struct mpu6050 *sensor)
+/* Counts out of bytes, up to `end`: one pass, for it stands between a sample in memory and its update. */
+static void decode(struct mpu6050 *sensor, uint8_t end)
 {
-    const uint8_t *bytes = sensor->bytes;
-    int16_t *counts = sensor->counts;
-    uint8_t changed = 0, answer = MPU6050_SAMPLE;
-    for (uint8_t k = 0; k < MPU6050_COUNTS; k++) {
+    const uint8_t *bytes = sensor->bytes + 2U * sensor->known;
+    int16_t *counts = sensor->counts + sensor->known;
+    for (uint8_t k = sensor->known; k < end; k++) {
         int16_t count = (int16_t)(uint16_t)(((uint16_t)bytes[0] << 8) | bytes[1]);
         if (count != *counts) {
-            changed = 1;
+            sensor->changed = 1;
             *counts = count;
         }
         if (count == INT16_MAX || count == INT16_MIN) {
-            answer = MPU6050_SATURATED;
+            sensor->saturated = 1;
         }
         bytes += 2;
         counts++;
     }
-    if (changed == 0U) {
+    sensor->known = end;
+}
+
+uint8_t mpu6050_part(struct mpu6050 *sensor)
+{
+    if (sensor->step != READ) {
+        return 0;
+    }
+    decode(sensor, BOARD_PART / 2U);
+    return 1;
+}
+
+static uint8_t sample(struct mpu6050 *sensor)
+{
+    decode(sensor, MPU6050_COUNTS);
+    if (sensor->changed == 0U) {
         return repeated(sensor);
     }
     sensor->equal = 0;
-    return answer;
+    return sensor->saturated != 0U ? MPU6050_SATURATED : MPU6050_SAMPLE;
 }
 
 static uint8_t failed(struct mpu6050 *sensor, uint8_t state)

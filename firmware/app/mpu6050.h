@@ -37,6 +37,7 @@ extern "C" {
 #define MPU6050_FAILURES 10U           /* periods in a row */
 #define MPU6050_STUCK 25U              /* equal samples in a row */
 #define MPU6050_COUNTS 7U
+#define MPU6050_GYRO 4U /* place of the gyro in ax ay az temperature gx gy gz */
 #define MPU6050_BURST 14U /* bytes */
 
 /* What a call tells. */
@@ -54,12 +55,18 @@ struct mpu6050 {
     uint8_t command[5];             /* bytes being written */
     uint8_t bytes[MPU6050_BURST];   /* bytes being read, big endian */
     int16_t counts[MPU6050_COUNTS]; /* the last sample: ax ay az temperature gx gy gz */
+    uint8_t known;                  /* counts of this period's sample that stand in `counts` already */
+    uint8_t changed;                /* 1: one of them differs from the last sample */
+    uint8_t saturated;              /* 1: one of them stands at the end of its range */
 };
 
 void mpu6050_start(struct mpu6050 *sensor);
 
 /* To be called when a period begins: starts the transfer of this period.  MPU6050_PENDING or MPU6050_NOTHING. */
 uint8_t mpu6050_tick(struct mpu6050 *sensor);
+
+/* May be called when BOARD_PART bytes have been read; 1: `counts` has the accelerometer's three. */
+uint8_t mpu6050_part(struct mpu6050 *sensor);
 
 /* To be called when a transfer has ended. */
 uint8_t mpu6050_transferred(struct mpu6050 *sensor);

@@ -8,7 +8,6 @@
 #ifndef FACTORLAB_SAMPLE_H
 #define FACTORLAB_SAMPLE_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "../core/calibration_f32.h"
@@ -21,29 +20,36 @@
 #include "calibration_default.h"
 #endif
 
-#define COUNTS_ACCEL 0 /* places in ax ay az temperature gx gy gz */
-#define COUNTS_GYRO 4
-
 #define SAMPLE_PERIOD_S 0.01f /* s */
 
-static inline void sample_q(const int16_t counts[7], struct imu_q *sample)
+static inline void sample_gyro_q(const int16_t counts[3], struct imu_q *sample)
 {
-    struct imu_raw raw;
-    for (uint8_t k = 0; k < 3; k++) {
-        raw.accel[k] = counts[COUNTS_ACCEL + k];
-        raw.gyro[k] = counts[COUNTS_GYRO + k];
-        raw.mag[k] = 0;
-    }
-    calibrate_q(&gyro_calibration_q, &accel_calibration_q, NULL, &raw, sample);
+    calibrate_q24(&gyro_calibration_q, counts, sample->gyro);
 }
 
-static inline void sample_f32(const int16_t counts[7], struct imu_f32 *sample)
+/* No sensor on Earth reads zeros: they stay zeros, which say that there is no reading. */
+static inline void sample_accel_q(const int16_t counts[3], struct imu_q *sample)
+{
+    if ((counts[0] | counts[1] | counts[2]) == 0) {
+        sample->accel[0] = sample->accel[1] = sample->accel[2] = 0;
+    } else {
+        calibrate_q8(&accel_calibration_q, counts, sample->accel);
+    }
+    sample->mag[0] = sample->mag[1] = sample->mag[2] = 0;
+}
+
+static inline void sample_gyro_f32(const int16_t counts[3], struct imu_f32 *sample)
+{
+    calibrate_f32(&gyro_calibration_f32, counts, sample->gyro);
+}
+
+static inline void sample_accel_f32(const int16_t counts[3], struct imu_f32 *sample)
 {
     const float none = 0.0f / 0.0f;
-    calibrate_f32(&accel_calibration_f32, counts + COUNTS_ACCEL, sample->accel);
-    calibrate_f32(&gyro_calibration_f32, counts + COUNTS_GYRO, sample->gyro);
-    if ((counts[0] | counts[1] | counts[2]) == 0) { /* no sensor on Earth reads that */
+    if ((counts[0] | counts[1] | counts[2]) == 0) {
         sample->accel[0] = sample->accel[1] = sample->accel[2] = none;
+    } else {
+        calibrate_f32(&accel_calibration_f32, counts, sample->accel);
     }
     sample->mag[0] = sample->mag[1] = sample->mag[2] = none;
 }

@@ -12,7 +12,7 @@
 #error "F_CPU is not defined: compile with -DF_CPU=16000000UL, as the Makefile does"
 #endif
 
-#define EVENTS GPIOR0 /* BOARD_TICK, BOARD_I2C, BOARD_RECEIVED */
+#define EVENTS GPIOR0 /* BOARD_TICK ... of board.h */
 #define HELD 7        /* bit of EVENTS: the phase of this period is still to come */
 
 #define MARK_SAMPLE PORTB0 /* D8: high from the end of a transfer to the next byte sent */

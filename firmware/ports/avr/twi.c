@@ -21,6 +21,7 @@ static struct {
     uint8_t *read;          /* where the next byte read goes */
     uint8_t to_write;       /* bytes */
     uint8_t to_read;        /* bytes */
+    uint8_t part;           /* bytes left to read when BOARD_I2C_PART is due; 255: never */
     uint8_t address;        /* 7 bits, shifted; bit 0: reading */
     uint8_t recovering;     /* half clocks since recovery began */
     volatile uint8_t state; /* BOARD_I2C_DONE ... */
@@ -42,6 +43,7 @@ void board_i2c_start(uint8_t address, const uint8_t *write, uint8_t write_length
     twi.to_write = write_length;
     twi.read = read;
     twi.to_read = read_length;
+    twi.part = read_length > BOARD_PART ? (uint8_t)(read_length - BOARD_PART) : UINT8_MAX;
     twi.state = BOARD_I2C_BUSY;
     TWCR = GO | _BV(TWSTA);
 }
@@ -86,6 +88,9 @@ ISR(TWI_vect)
         *twi.read++ = TWDR;
         twi.to_read--;
         want();
+        if (twi.to_read == twi.part) {
+            EVENTS |= BOARD_I2C_PART;
+        }
         break;
     case TW_MR_DATA_NACK:
         *twi.read = TWDR;
