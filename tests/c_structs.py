@@ -43,9 +43,11 @@ def _fields(line: str, known: dict[str, type[ctypes.Structure]]) -> list[tuple[s
 
 
 def library(compiler: str, folder: Path, *modules: str, flags: tuple[str, ...] = ()) -> ctypes.CDLL:
-    """Modules of the core, compiled to a shared library in a folder of the tests."""
+    """Modules of the core, compiled to a shared library in a folder of the tests, once."""
     target = folder / f"lib{'_'.join(modules)}.so"
     sources = [str(CORE / f"{module}.c") for module in modules]
+    if target.exists():
+        return ctypes.CDLL(str(target))
     subprocess.run(
         [compiler, "-std=c99", "-O2", *WARNINGS, "-ffp-contract=off", "-fPIC", "-shared", *flags, *sources,
          "-o", str(target), "-lm"],

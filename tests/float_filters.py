@@ -11,6 +11,7 @@ from c_structs import library, structs
 
 from sequential.attitude import ComplementaryAttitude, Mahony, TiltKalman
 from sequential.attitude.estimator import AttitudeFilter
+from sequential.sensors import ImuRecording
 
 STEP_TOLERANCE = 1e-6
 
@@ -155,6 +156,14 @@ class FloatFilter:
     def _sample(self, sample: np.ndarray) -> ctypes.Structure:
         own = np.ascontiguousarray(sample, dtype=np.float32)
         return self.types["imu_f32"].from_buffer_copy(own.tobytes())
+
+
+def recorded_table(recording: ImuRecording, magnetometer: bool | None) -> tuple[np.ndarray, np.ndarray]:
+    """Samples (N, 9) of single precision, and dt (N,) with 0 first."""
+    mag = recording.mag if magnetometer is not False else None
+    field = np.full_like(recording.gyro, np.nan) if mag is None else mag
+    samples = np.hstack([recording.gyro, recording.accel, field]).astype(np.float32)
+    return samples, (np.diff(recording.t, prepend=recording.t[0]) * 1e-9).astype(np.float32)
 
 
 def single_settings(python: AttitudeFilter) -> AttitudeFilter:

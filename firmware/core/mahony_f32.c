@@ -29,18 +29,23 @@ INLINE_F32 int rest(struct mahony_f32_state *restrict s, const struct mahony_f32
     return 1;
 }
 
-/* By how much the accelerometer's error is shortened: a tilt error lasts in the world, a push does not. */
-INLINE_F32 float shortening(struct mahony_f32_state *restrict s,
-                               const struct mahony_f32_derived *restrict d, float east, float south, float dt)
+/* The time that the accelerometer's error counts for, doubled; less where it is longer than its limit.
+ * A tilt error lasts in the world, a push does not. */
+INLINE_F32 float counting(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                          float east, float south, float dt)
 {
     const float keep = dt / (d->lasting_time + dt);
     const float lasting_east = s->lasting[0] + (east - s->lasting[0]) * keep;
     const float lasting_north = s->lasting[1] - (south + s->lasting[1]) * keep;
     const float limit = d->error_limit + sqrtf(lasting_east * lasting_east + lasting_north * lasting_north);
     const float squared = east * east + south * south;
+    float twice = dt + dt;
     s->lasting[0] = lasting_east;
     s->lasting[1] = lasting_north;
-    return squared > limit * limit && !s->starting ? limit / sqrtf(squared) : 1.0f;
+    if (squared > limit * limit && !s->starting) {
+        twice *= limit / sqrtf(squared);
+    }
+    return twice;
 }
 
 /* The published error of the field, m/|m| x n, which leans on roll and pitch as well. */
@@ -54,55 +59,65 @@ static struct vector_f32 published_error(struct vector_f32 north, struct vector_
     return cross_f32(m, n);
 }
 
-/* Whether a heading so far off is held to be a disturbance: until the timeout. */
-INLINE_F32 int gated(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
-                        float north, float stands_for)
+/* Half the vertical, about which a heading error turns, or the published error. */
+struct heading {
+    struct vector_f32 axis; /* 1/2 */
+    float times;            /* s, the time that it counts for, times the error's sine */
+};
+
+/* The field off its gate or behind: a disturbance until the timeout, then the whole of the error's sign. */
+static float far_off(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
+                     float north, float east, float age)
 {
-    if (!(north < d->gate_cosine)) {
+    if (north < d->gate_cosine) {
+        if (s->out_of_gate <= d->heading_timeout) {
+            s->out_of_gate += age;
+        }
+        if (s->out_of_gate <= d->heading_timeout) {
+            return 0.0f;
+        }
+    } else {
         s->out_of_gate = 0.0f;
-        return 0;
     }
-    if (s->out_of_gate <= d->heading_timeout) {
-        s->out_of_gate += stands_for;
-    }
-    return s->out_of_gate <= d->heading_timeout;
+    return north > 0.0f ? age * east : (east < 0.0f ? -age : age);
 }
 
-/* Heading error times the time that the field stands for, about half the vertical; the first sets north. */
-INLINE_F32 struct vector_f32 heading_error(struct mahony_f32_state *restrict s,
-                                           const struct mahony_f32_derived *restrict d,
-                                           struct level_rows_f32 rows, struct vector_f32 mag,
-                                           struct quaternion_f32 *q, float *times)
+/* Heading error times the time that the field stands for; the first field sets north. */
+INLINE_F32 struct heading heading_error(struct mahony_f32_state *restrict s,
+                                        const struct mahony_f32_derived *restrict d,
+                                        struct level_rows_f32 rows, struct vector_f32 mag, float dt,
+                                        struct quaternion_f32 *q)
 {
-    const struct vector_f32 none = {0.0f, 0.0f, 0.0f};
-    const float across = dot_f32(rows.east, mag), along = dot_f32(rows.north, mag);
-    const float level = across * across + along * along; /* uT^2, a quarter of the level part */
-    if (!(level > STEEP_SQUARED * dot_f32(mag, mag)) || !usable_f32(level)) {
+    struct heading none = {{0.0f, 0.0f, 0.0f}, 0.0f}, found;
+    const float east = dot_f32(rows.east, mag), north = dot_f32(rows.north, mag);
+    const float level = east * east + north * north; /* uT^2, a quarter of the level part */
+    float age = s->since_field + dt;
+    if (!(level > STEEP_SQUARED * dot_f32(mag, mag))) {
+        s->since_field = age;
         return none;
     }
-    const float scale = 1.0f / sqrtf(level), east = across * scale, north = along * scale;
-    const float stands_for = s->since_field < OLDEST ? s->since_field : OLDEST;
+    const float length = sqrtf(level);
     s->since_field = 0.0f;
     if (RARELY_F32(!s->heading_known)) {
-        *q = north_set_f32(*q, east, north);
+        *q = north_set_f32(*q, east / length, north / length);
         s->heading_known = 1;
         return none;
     }
-    if (gated(s, d, north, stands_for)) {
-        return none;
+    if (RARELY_F32(age > OLDEST)) {
+        age = OLDEST;
     }
-    const struct vector_f32 half_up = half_up_f32(*q);
+    if (RARELY_F32(north < d->gate_ahead * length)) {
+        found.times = 2.0f * far_off(s, d, north / length, east / length, age);
+    } else {
+        s->out_of_gate = 0.0f;
+        found.times = (age + age) * east / length;
+    }
+    found.axis = half_up_f32(*q);
     if (RARELY_F32(d->tilt_by_field)) {
-        *times = stands_for;
-        return published_error(rows.north, half_up, mag);
+        found.axis = published_error(rows.north, found.axis, mag);
+        found.times = found.times != 0.0f ? age : 0.0f;
     }
-    *times = stands_for + stands_for;
-    if (north > 0.0f) {
-        *times *= east;
-    } else if (east < 0.0f) {
-        *times = -*times;
-    }
-    return half_up;
+    return found;
 }
 
 INLINE_F32 float clamped(float x, float limit)
@@ -143,7 +158,7 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
                      const struct imu_f32 *restrict sample, float dt, int with_field)
 {
     const struct vector_f32 gyro = load_vector_f32(sample->gyro), zero = {0.0f, 0.0f, 0.0f};
-    float kp = d->gain, kh = d->heading_gain, ki = d->integral_gain, times = 0.0f, lasts = 0.0f;
+    float kp = d->gain, kh = d->heading_gain, ki = d->integral_gain, counts = 0.0f;
     if (RARELY_F32(!finite_f32(gyro))) {
         return;
     }
@@ -157,32 +172,33 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
         kh += boost;
         ki = s->starting ? 0.0f : ki;
     }
-    struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
-    struct vector_f32 bias = load_vector_f32(s->gyro_bias), tilt = zero, heading = zero;
     const struct vector_f32 accel = load_vector_f32(sample->accel);
-    const struct level_rows_f32 rows = level_rows_f32(q);
     const float force = dot_f32(accel, accel);
-    if (RARELY_F32(!usable_f32(force))) {
+    const int bad = !usable_f32(force);
+    struct vector_f32 bias = load_vector_f32(s->gyro_bias), tilt = zero;
+    struct heading heading = {zero, 0.0f};
+    if (bad) {
         s->at_rest = 0.0f;
-    } else {
-        if (rest(s, d, gyro, accel, dt, &bias)) {
-            ki = 0.0f;
-        }
+    } else if (rest(s, d, gyro, accel, dt, &bias)) {
+        ki = 0.0f;
+    }
+    struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
+    const struct level_rows_f32 rows = level_rows_f32(q);
+    if (!bad) {
         const float scale = 2.0f / sqrtf(force);
         const float east = scale * dot_f32(rows.north, accel), south = scale * dot_f32(rows.east, accel);
         tilt = minus_f32(scaled_f32(rows.east, east), rows.north, south);
-        lasts = shortening(s, d, east, south, dt) * (dt + dt);
+        counts = counting(s, d, east, south, dt);
     }
     if (with_field) {
-        s->since_field += dt;
-        heading = heading_error(s, d, rows, load_vector_f32(sample->mag), &q, &times);
-        bias = minus_f32(bias, heading, ki * times);
+        heading = heading_error(s, d, rows, load_vector_f32(sample->mag), dt, &q);
+        bias = minus_f32(bias, heading.axis, ki * heading.times);
     }
-    bias = limited(minus_f32(bias, tilt, ki * lasts), d);
+    bias = limited(minus_f32(bias, tilt, ki * counts), d);
     store_vector_f32(s->gyro_bias, bias);
-    struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, kp * lasts);
+    struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, kp * counts);
     if (with_field) {
-        r = plus_f32(r, heading, kh * times);
+        r = plus_f32(r, heading.axis, kh * heading.times);
     }
     store_quaternion_f32(s->world_q_body, turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r))));
 }

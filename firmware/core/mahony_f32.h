@@ -13,7 +13,7 @@
  * step agrees to 1e-6.  R (a x v) = (R a) x z, so that both the error and its lasting part come from two rows
  * of the rotation matrix.
  *
- * Cost: instructions on a Cortex-M4F, -O2, with and without fused products: 9-D 290/340, 6-D 210/250,
+ * Cost: instructions on a Cortex-M4F, -O2, with and without vmla: 9-D 291/335, 6-D 215/254,
  * `mahony_f32_step_published` 122/151; firmware/budget.csv.
  *
  * What it does with bad input
@@ -66,6 +66,7 @@ struct mahony_f32_derived {
     float error_limit;     /* 1 */
     float lasting_time;    /* s */
     float gate_cosine;     /* 1, of heading_gate; -2: no gate */
+    float gate_ahead;      /* 1, the same, but no less than 0 */
     float heading_timeout; /* s */
     float boost;           /* 1/s, start_gain - gain */
     float start_time;      /* s */

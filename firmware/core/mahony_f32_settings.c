@@ -59,6 +59,7 @@ void mahony_f32_derive(const struct mahony_f32_settings *settings, struct mahony
     derived->error_limit = settings->error_limit;
     derived->lasting_time = settings->lasting_time;
     derived->gate_cosine = settings->heading_gate < PI ? cosine(settings->heading_gate) : -2.0f;
+    derived->gate_ahead = derived->gate_cosine > 0.0f ? derived->gate_cosine : 0.0f;
     derived->heading_timeout = settings->heading_timeout;
     derived->boost = settings->start_gain - settings->gain;
     derived->start_time = settings->start_time;

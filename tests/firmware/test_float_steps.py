@@ -11,6 +11,7 @@ from float_filters import (
     TILT,
     FloatFilter,
     published_seen,
+    recorded_table,
     single_settings,
 )
 
@@ -36,24 +37,22 @@ TRIALS = ("07", "21", "29")
 """Fast, long with a wandering bias, and disturbed by a magnet."""
 
 
+@pytest.fixture(scope="module", name="folder")
+def of_what_is_compiled(tmp_path_factory):
+    return tmp_path_factory.mktemp("core")
+
+
 @pytest.fixture(params=CASES, name="case")
 def every_case(request):
     return CASES[request.param]
 
 
-def table(recording, magnetometer):
-    """Samples (N, 9) of single precision, and dt (N,) with 0 first."""
-    mag = recording.mag if magnetometer is not False else np.full_like(recording.gyro, np.nan)
-    samples = np.hstack([recording.gyro, recording.accel, mag]).astype(np.float32)
-    return samples, np.diff(recording.t, prepend=recording.t[0]).astype(np.float32) * np.float32(1e-9)
-
-
 @pytest.mark.parametrize("trial", TRIALS)
-def test_a_step_is_the_python_step(case, trial, data_dir, c_compiler, tmp_path):
+def test_a_step_is_the_python_step(case, trial, data_dir, c_compiler, folder):
     pair, python = case
     (path,) = (data_dir / "imu" / "broad").glob(f"{trial}_*.npz")
-    samples, dt = table(read_broad(path)[0], python.magnetometer)
-    own = FloatFilter(pair, c_compiler, tmp_path)
+    samples, dt = recorded_table(read_broad(path)[0], python.magnetometer)
+    own = FloatFilter(pair, c_compiler, folder)
     python = single_settings(python)
     own.use(python)
     own.start(samples[0])
