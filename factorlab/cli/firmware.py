@@ -10,6 +10,7 @@ __all__ = ["firmware"]
 
 COMMANDS = {
     "build": ("factorlab.cli.firmware_build", "build", "An image for a board: filter, driver, serial line."),
+    "emulate": ("factorlab.cli.firmware_emulate", "emulate", "Run an image on a recording, without a board."),
 }
 
 
