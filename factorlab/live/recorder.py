@@ -19,6 +19,7 @@ __all__ = ["MODES", "RecordSettings", "record_serial"]
 MODES = {"raw": b"r", "quaternion": b"q", "angles": b"a", "text": b"t"}
 BOOT = b"b"
 SPEED_S = 0.6  # for a first frame at one speed, where bytes come
+UNREAD = 100  # of them at least: a board that is being reset sends a few that mean nothing
 ASK_S = 0.3  # between two requests: a board that is starting does not hear the first
 
 
@@ -102,8 +103,8 @@ def _listen(
         if data := port.receive():
             taker.feed(data, time.monotonic_ns())
             heard = elapsed
-        if taker.unreadable and elapsed - trial > patience and port.next_speed():
-            taker.unreadable, trial, asked = False, elapsed, -math.inf
+        if taker.unread > UNREAD and elapsed - trial > patience and port.next_speed():
+            taker.unread, trial, asked = 0, elapsed, -math.inf
         if elapsed - trial > settings.wait:
             if not taker.samples:
                 return f"{port.name} {taker.silence(port.tried)} (waited {elapsed:.1f} s)"

@@ -47,6 +47,7 @@ class GrowingFile:
         self._file: IO[str] | None = None
         self._waiting: list[str] = []
         self._flushed = 0.0
+        self._whole = 0  # bytes of whole lines in the file
 
     def write(self, lines: str) -> None:
         """Add whole lines."""
@@ -59,17 +60,24 @@ class GrowingFile:
 
     def close(self) -> None:
         """Give the file its name; without a line there is no file."""
+        self._flush()
         if self._file is not None:
-            self._flush()
             os.fsync(self._file.fileno())
             self._file.close()
             self.part.replace(self.goal)
 
     def _flush(self) -> None:
-        if self._file is not None:
+        if self._file is None:
+            return
+        try:
             self._file.write("".join(self._waiting))
             self._file.flush()
-            self._waiting.clear()
+            self._whole = self._file.tell()
+        except OSError as fault:
+            self._file = None  # nothing more goes in
+            os.truncate(self.part, self._whole)
+            raise DataError(f"{self.part} holds what came before: {fault.strerror}") from fault
+        self._waiting.clear()
 
 
 def rows_of(goal: Path, mode: str, boot: BootFrame | None) -> tuple[str, Row]:

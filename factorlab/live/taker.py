@@ -39,7 +39,7 @@ class Taker:
 
     Attributes
     ----------
-    unreadable : bytes came and not one frame was among them
+    unread : bytes, while there was not one frame among them; whoever changes the speed sets it to 0
     """
 
     def __init__(self, mode: str, wanted_s: float | None, file: GrowingFile) -> None:
@@ -53,7 +53,7 @@ class Taker:
         self._counts = dict.fromkeys(COUNTED, 0)
         self._bytes = 0
         self._starting = False  # frames came, but no sample yet
-        self.unreadable = False
+        self.unread = 0
         self._other: Frame | None = None  # of another kind, and no wanted one since
 
     @property
@@ -87,7 +87,7 @@ class Taker:
         """Take bytes that came at this time of a clock that never runs backwards."""
         self._bytes += len(data)
         frames = self._decoder.feed(data)
-        self.unreadable = not self._decoder.frames
+        self.unread = 0 if self._decoder.frames else self.unread + len(data)
         for frame in frames:
             self._take(frame, arrival_ns)
 

@@ -230,6 +230,21 @@ def test_a_board_built_with_another_calibration_is_told(core, tmp_path):
     assert f"built with calibration cafe0123, {calibration} is {expected}" in done.stderr
 
 
+def test_a_full_disk_is_one_sentence_and_keeps_what_fits(core, tmp_path):
+    path, code = tmp_path / "imu.csv", "import resource as r; r.setrlimit(r.RLIMIT_FSIZE, (60_000, -1)); "
+    code += "import signal, runpy, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+    code += "sys.argv = ['factorlab', *sys.argv[1:]]; runpy.run_module('factorlab', run_name='__main__')"
+    with Board(core, pause_s=0.002) as board:
+        command = [sys.executable, "-c", code, *COMMAND[3:], board.port, "-o", str(path)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "holds what came before: File too large" in done.stderr
+    part = path.with_name("imu.csv.part")
+    assert 5_000 < part.stat().st_size <= 60_000
+    assert {len(row) for row in rows(part)} == {8}
+
+
 def test_a_file_that_is_there_is_kept(core, tmp_path):
     path = tmp_path / "imu.csv"
     path.write_text("mine")
