@@ -87,6 +87,15 @@ def c_compiler() -> str:
 
 
 @pytest.fixture(scope="session")
+def cxx_compiler() -> str:
+    """A compiler of C++."""
+    found = shutil.which("g++") or shutil.which("c++")
+    if found is None:
+        pytest.skip("needs a C++ compiler: install Debian's g++")
+    return found
+
+
+@pytest.fixture(scope="session")
 def firmware_dir() -> Path:
     """The C sources of the firmware."""
     return Path(__file__).resolve().parents[1] / "firmware"

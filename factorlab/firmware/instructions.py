@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,13 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sequential.errors import DataError, FactorlabError
+from factorlab.firmware.toolchain import firmware_folder, require_tools, run_tool
+from sequential.errors import DataError, SolverError
 from sequential.sensors import ImuRecording
 
 __all__ = ["IMU_F32", "IMU_Q", "InstructionCounts", "count_instructions", "imu_f32", "imu_q"]
 
-FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
-PORT = FIRMWARE / "ports" / "cortex_m4"
 COMPILER, EMULATOR = "arm-none-eabi-gcc", "qemu-system-arm"
 IMU_F32 = np.dtype([("gyro", "<f4", 3), ("accel", "<f4", 3), ("mag", "<f4", 3)])
 IMU_Q = np.dtype([("gyro", "<i4", 3), ("accel", "<i2", 3), ("mag", "<i2", 3)])
@@ -110,17 +107,15 @@ def count_instructions(
     Raises
     ------
     DataError
-        where the samples are not of the module's kind, or the tools are missing.
-    FactorlabError
-        with the tool's own words, where the image does not build or run.
+        where the samples are not of the module's kind.
+    ToolMissingError
+        where compiler or emulator are missing, or refuse the module.
     """
     fixed = module.endswith("_q")
     if samples.dtype != (wanted := IMU_Q if fixed else IMU_F32):
         raise DataError(f"{module} takes samples of dtype {wanted}, got {samples.dtype}")
-    for tool in (COMPILER, EMULATOR):
-        if shutil.which(tool) is None:
-            raise DataError(f"needs {tool}: install Debian's gcc-arm-none-eabi and qemu-system-arm")
-    header = header or FIRMWARE / "core" / f"{module}.h"
+    require_tools("m4", emulate=True)
+    header = header or firmware_folder() / "core" / f"{module}.h"
     with tempfile.TemporaryDirectory() as folder:
         image, source, sink = (Path(folder) / name for name in ("count.elf", "samples", "updates"))
         defined = _defined(module, step, names) | {
@@ -133,7 +128,7 @@ def count_instructions(
         updates = np.frombuffer(sink.read_bytes(), np.dtype([("n", "<u4"), ("q", component, 4)]))
         text = _text(image.with_suffix(".map"), header.parent)
     if len(updates) != len(samples):
-        raise FactorlabError(f"{module} gave {len(updates)} of {len(samples)} updates in {EMULATOR}")
+        raise SolverError(f"{module} gave {len(updates)} of {len(samples)} updates in {EMULATOR}")
     q = updates["q"].astype(np.float64)
     return InstructionCounts(
         updates["n"].astype(np.int64), q / 2.0**30 if fixed else q, updates["q"].copy(), text
@@ -149,35 +144,30 @@ def _defined(module: str, step: str | None, names: Mapping[str, str] | None) -> 
 
 
 def _build(image: Path, core: Path, defined: list[str], optimize: str) -> None:
+    firmware = firmware_folder()
+    port = firmware / "ports" / "cortex_m4"
     sources = [
-        FIRMWARE / "check" / "cycles_m4.c", PORT / "startup.c", PORT / "qemu" / "semihosting.c",
+        firmware / "check" / "cycles_m4.c", port / "startup.c", port / "qemu" / "semihosting.c",
         *sorted(core.glob("*.c")),
     ]  # fmt: skip
-    _run([COMPILER, *FLAGS, optimize, *defined, "-c", *map(str, sources)], image.parent)
+    compiling = [COMPILER, *FLAGS, optimize, *defined, "-c", *map(str, sources)]
+    run_tool(compiling, cwd=image.parent, what=f"compiling {core}")
     objects = [source.with_suffix(".o").name for source in sources]
-    _run([
-        COMPILER, *FLAGS, *LINK, f"-L{PORT}", "-T", str(PORT / "qemu" / "mps2.ld"),
+    linking = [
+        COMPILER, *FLAGS, *LINK, f"-L{port}", "-T", str(port / "qemu" / "mps2.ld"),
         f"-Wl,-Map={image.with_suffix('.map')}", *objects, "-lm", "-o", str(image),
-    ], image.parent)  # fmt: skip
+    ]  # fmt: skip
+    run_tool(linking, cwd=image.parent, what=f"linking {core}")
 
 
 def _emulate(image: Path, source: Path, sink: Path) -> None:
-    words = ",".join(f"arg={word}" for word in ("count", source, sink))
-    _run([
-        EMULATOR, "-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none",
+    words = ",".join(f"arg={word.name}" for word in (image, source, sink))
+    emulating = [
+        EMULATOR, "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none",
         "-icount", "shift=10", "-semihosting-config", f"enable=on,target=native,{words}",
         "-kernel", str(image),
-    ], image.parent)  # fmt: skip
-
-
-def _run(command: list[str], folder: Path) -> None:
-    done = subprocess.run(  # noqa: S603 (our own tools, no shell)
-        command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, cwd=folder
-    )
-    if done.returncode:
-        raise FactorlabError(
-            f"{Path(command[0]).name} failed ({done.returncode}): {done.stderr.strip()[-4000:]}"
-        )
+    ]  # fmt: skip
+    run_tool(emulating, cwd=image.parent, what="counting instructions")
 
 
 def _text(linker_map: Path, core: Path) -> dict[str, int]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from factorlab.firmware.instructions import IMU_F32, IMU_Q, count_instructions, imu_q
-from sequential.errors import DataError, FactorlabError
+from sequential.errors import DataError, ToolMissingError
 from sequential.sensors import ImuRecording
 
 # Spins magnetometer x times round a loop of two instructions, after three and before the return.
@@ -73,7 +73,7 @@ def test_every_update_is_counted_to_the_instruction(spin, suffix, dtype, rng):
 @pytest.mark.usefixtures("arm_toolchain", "qemu")
 def test_a_module_that_does_not_build_is_told_in_the_compilers_words(spin):
     (spin / "spin_f32.c").write_text("int broken(", encoding="utf-8")
-    with pytest.raises(FactorlabError, match=r"spin_f32\.c:1"):
+    with pytest.raises(ToolMissingError, match=r"spin_f32\.c:1"):
         count_instructions("spin_f32", np.zeros(1, IMU_F32), header=spin / "spin_f32.h")
 
 

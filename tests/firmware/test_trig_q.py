@@ -98,7 +98,9 @@ def test_axes_diagonals_and_ends_of_the_range(core):
     fine, angle, length = vectors(core, y, x)
     assert apart(fine, np.array(turns)).max() < 0.001
     assert apart(angle, np.array(turns)).max() == 0.0
-    np.testing.assert_allclose(length, np.hypot(np.array(y, float), np.array(x, float)), rtol=4.5e-5, atol=0.5)
+    np.testing.assert_allclose(
+        length, np.hypot(np.array(y, float), np.array(x, float)), rtol=4.5e-5, atol=0.5
+    )
 
 
 def test_laws_of_the_angle(core, rng):

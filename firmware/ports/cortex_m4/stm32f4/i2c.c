@@ -3,6 +3,7 @@
  * Source: RM0368 18.3.3, master transmitter and receiver.  The last bytes of a read are taken by BTF, when two lie in the
  * data and the shift register and the clock is held: so no deadline hangs on the acknowledgement being taken back in time
  * (a single byte: acknowledgement off before the address is cleared; two: POS).
+ * tests/firmware/stm32_i2c.cpp runs this file against a model of the peripheral made after the same pages.
  */
 #include "../../../app/board.h"
 #include "port.h"
@@ -91,21 +92,36 @@ static void take(void)
     bus.to_read--;
 }
 
-/* The address was acknowledged; reading both status registers goes on. */
-static void addressed(void)
+/* Reading both status registers clears the address, and the first byte comes in. */
+static void clear_address(void)
 {
-    uint32_t acknowledge = I2C_CR1_ACK;
-    if (bus.address % 2U == 1U && bus.to_read <= 2U) {
-        acknowledge = bus.to_read == 2U ? I2C_CR1_POS : 0UL;
-    }
-    I2C1->cr1 = (I2C1->cr1 & ~(I2C_CR1_ACK | I2C_CR1_POS)) | acknowledge;
-    if (bus.address % 2U == 1U && bus.to_read >= 2U && bus.to_read <= 3U) {
+    const uint32_t first = I2C1->sr1;
+    const uint32_t second = I2C1->sr2;
+    (void)first;
+    (void)second;
+}
+
+static void addressed_to_read(void)
+{
+    const uint32_t kept = I2C1->cr1 & ~(I2C_CR1_ACK | I2C_CR1_POS);
+    if (bus.to_read <= 3U && bus.to_read > 1U) {
         I2C1->cr2 &= ~I2C_CR2_ITBUFEN; /* by BTF from the start */
     }
-    (void)I2C1->sr1;
-    (void)I2C1->sr2;
-    if (bus.address % 2U == 1U && bus.to_read == 1U) {
+    switch (bus.to_read) {
+    case 1:
+        I2C1->cr1 = kept;
+        clear_address();
         I2C1->cr1 |= I2C_CR1_STOP;
+        break;
+    case 2:
+        I2C1->cr1 = kept | I2C_CR1_ACK | I2C_CR1_POS;
+        clear_address();
+        I2C1->cr1 &= ~I2C_CR1_ACK;
+        break;
+    default:
+        I2C1->cr1 = kept | I2C_CR1_ACK;
+        clear_address();
+        break;
     }
 }
 
@@ -158,7 +174,11 @@ void i2c1_event_handler(void)
     if ((state & I2C_SR1_SB) != 0U) {
         I2C1->dr = bus.address;
     } else if ((state & I2C_SR1_ADDR) != 0U) {
-        addressed();
+        if (bus.address % 2U == 1U) {
+            addressed_to_read();
+        } else {
+            clear_address();
+        }
     } else if (bus.address % 2U == 0U) {
         if ((state & (I2C_SR1_TXE | I2C_SR1_BTF)) != 0U) {
             transmit(state);
