@@ -1,13 +1,18 @@
 """The board of an ATmega328P: bus, driver, clock and serial line, on a sensor that we invent."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from factorlab.firmware.avr import ABSENT, GOOD, HUNG, emulate_avr
+from factorlab.firmware.toolchain import run_tool
 from sequential.errors import DataError, ShapeError, ToolMissingError
 from sequential.readers.serial import Status
 
 MISSING, OVERRUN, SATURATED = Status.SAMPLE_MISSING, Status.OVERRUN, Status.SATURATED
+APP = Path(__file__).resolve().parents[2] / "firmware" / "app"
+FILTERS = sorted({one.stem.removeprefix("filter_") for one in APP.glob("filter_*.c")} - {"error_state_f32"})
 STUCK = 25  # MPU6050_STUCK
 
 
@@ -163,3 +168,27 @@ def test_what_is_no_sample_is_refused(recorder, counts):
         recorder(counts, mode="x")
     with pytest.raises(ShapeError, match="faults"):
         recorder(counts, faults=[0, 1])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [one.stem.removeprefix("filter_") for one in APP.glob("filter_*.c") if "error_state" not in one.stem],
+)
+def test_every_filter_fits_and_runs(avr_image, avr_simulator, rng, name):
+    level = np.array([0, 0, 4096, 0, 0, 0, 0]) + rng.integers(-20, 20, (200, 7))
+    image = avr_image(FILTER=name)
+    emulation = emulate_avr(image, level, simulator=avr_simulator)
+    assert emulation.filter == name
+    assert emulation.lost == emulation.corrupt == 0
+    np.testing.assert_allclose(np.linalg.norm(emulation.world_q_body, axis=1), 1.0, atol=1e-3)
+    # level but for the noise
+    assert np.abs(emulation.world_q_body[:, 1:3]).max() < 0.02
+    words = run_tool(["avr-size", str(image)]).split("\n")[1].split()
+    text, data, bss = (int(word) for word in words[:3])
+    assert text + data < 30_000  # 32 kB less a boot loader
+    assert data + bss + emulation.stack < 1024  # of 2 kB
+
+
+def test_filter_that_is_none_is_named(avr_image):
+    with pytest.raises(ToolMissingError, match=r"no filter 'mahoni_q': FILTER is one of .*mahony_q"):
+        avr_image(FILTER="mahoni_q")

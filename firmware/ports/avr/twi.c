@@ -29,7 +29,7 @@ static struct {
 
 void twi_start(void)
 {
-    PORTC |= SDA | SCL; /* weak pull-ups: the sensor's board has its own */
+    PORTC |= SDA | SCL; /* weak pull-ups, in case the sensor's board has none */
     TWSR = 0;
     TWBR = TWI_DIVIDER;
     TWCR = _BV(TWEN);

@@ -1,0 +1,1 @@
+#include "../core/error_state_report_f32.c"
