@@ -7,7 +7,7 @@
  *     void binding_M_step(const double *settings, double rate_hz, const double sample[9], double dt, double *state);
  *     int32_t binding_M_state_size(void);    // of `state`, doubles
  *
- * `settings` holds the fields of struct M_settings in their order.  `sample` is gyro (rad/s), accelerometer
+ * `settings` holds what the FIELDS of the Python class name, in their order.  `sample` is gyro (rad/s), accelerometer
  * (m/s^2), magnetometer (uT, NaN: none).  `state` begins with the quaternion.  For mahony_f32, tilt_f32 and
  * complementary_f32 it holds numbers in the layout of the Python filter of that name, so that both can step
  * from an equal state; for the others the struct as it lies in memory follows.  Arrays are contiguous.

@@ -7,16 +7,22 @@
 #define HEAD 4 /* doubles before the struct: the quaternion */
 #define BIAS_UNIT 4294967296.0 /* Q32 */
 
-/* struct mahony_q_settings holds floats only, in the order of Python's array. */
+/* In the order of the fields of the Python filter. */
 static void derive(const double *p, double rate_hz, struct mahony_q_derived *derived)
 {
-    struct mahony_q_settings settings;
-    float fields[sizeof settings / sizeof(float)];
-    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
-        fields[i] = (float)p[i];
-    }
-    memcpy(&settings, fields, sizeof settings);
-    mahony_q_derive(&settings, (uint16_t)rate_hz, derived);
+    struct mahony_q_settings s;
+    s.gain = (float)p[0];
+    s.integral_gain = (float)p[1];
+    s.bias_limit = (float)p[2];
+    s.error_limit = (float)p[3];
+    s.lasting_time = (float)p[4];
+    s.start_gain = (float)p[5];
+    s.start_time = (float)p[6];
+    s.rest_gyro = (float)p[7];
+    s.rest_accel = (float)p[8];
+    s.rest_time = (float)p[9];
+    s.rest_constant = (float)p[10];
+    mahony_q_derive(&s, (uint16_t)rate_hz, derived);
 }
 
 void binding_mahony_q_run(const double *settings, const struct recording *in, const struct answer *out)

@@ -2,6 +2,7 @@
 
 from sequential.firmware.build import compile_core, library_path, source_folder
 from sequential.firmware.complementary import CComplementary
+from sequential.firmware.error_state import CErrorState
 from sequential.firmware.filters import FirmwareFilter, FixedPointFilter
 from sequential.firmware.library import load_library, missing
 from sequential.firmware.mahony import CMahony, CMahonyFixed
@@ -9,6 +10,7 @@ from sequential.firmware.tilt_kalman import CTiltKalman
 
 __all__ = [
     "CComplementary",
+    "CErrorState",
     "CMahony",
     "CMahonyFixed",
     "CTiltKalman",

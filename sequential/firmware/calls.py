@@ -62,7 +62,7 @@ def run(
     ----------
     entry : name of the module in firmware/core, such as "mahony_f32"
     known : fields of an attitude history that the filter knows, of WIDTHS, rest and magnetic_disturbance
-    settings : in the order of the C struct
+    settings : in the order of the filter's FIELDS
     t : (N,) ns
     gyro, accel, mag : (N, 3) rad/s, m/s², µT
     rate_hz : nominal rate, for filters in fixed point

@@ -30,6 +30,7 @@ class CComplementary(FirmwareFilter):
 
     ENTRY: ClassVar[str] = "complementary_f32"
     FIELDS: ClassVar[tuple[str, ...]] = ("time_constant", "heading_time_constant")
+    SHARES_STATE: ClassVar[bool] = True
 
     @property
     def name(self) -> str:

@@ -42,6 +42,7 @@ class FirmwareFilter(AttitudeFilter):
     ENTRY: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[str, ...]] = ()
     KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body",)  # fields of an attitude history
+    SHARES_STATE: ClassVar[bool] = False  # whether `step` takes a state of the Python filter
 
     def __post_init__(self) -> None:
         if self.magnetometer is None:
@@ -54,7 +55,7 @@ class FirmwareFilter(AttitudeFilter):
 
     @property
     def settings(self) -> Array:
-        """What the C struct of the settings holds, in its order."""
+        """What the binding takes, in the order of FIELDS."""
         return np.array([float(getattr(self.reference, name)) for name in self.FIELDS])
 
     def start(self, gyro: ArrayLike, accel: ArrayLike) -> Array:

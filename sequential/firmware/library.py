@@ -11,10 +11,9 @@ from sequential.firmware.build import compile_core, library_path, source_folder
 
 __all__ = ["load_library", "missing"]
 
-REMEDY = "then run `python -m sequential.firmware`"
+REMEDY = "run `python -m sequential.firmware`"
 
 
-@functools.cache
 def load_library() -> ctypes.CDLL:
     """The C core as ctypes sees it.
 
@@ -23,22 +22,30 @@ def load_library() -> ctypes.CDLL:
     ToolMissingError
         where it is not compiled and cannot be: one sentence with what to install.
     """
+    found = loaded()
+    if isinstance(found, str):
+        raise ToolMissingError(found)
+    return found
+
+
+@functools.cache
+def loaded() -> ctypes.CDLL | str:
+    """The library, or why there is none; found out once a process."""
     path = library_path()
-    if _stale(path):
-        _compile(path)
     try:
+        if _stale(path):
+            _compile(path)
         return ctypes.CDLL(str(path))
+    except ToolMissingError as error:
+        return str(error)
     except OSError as error:
-        raise ToolMissingError(f"the C core {path} does not load ({error}); {REMEDY}") from error
+        return f"the C core {path} does not load ({error}); {REMEDY}"
 
 
 def missing() -> str:
     """Why the C filters cannot run here, one sentence; empty where they can."""
-    try:
-        load_library()
-    except ToolMissingError as error:
-        return str(error)
-    return ""
+    found = loaded()
+    return found if isinstance(found, str) else ""
 
 
 def _stale(path: Path) -> bool:
@@ -65,4 +72,4 @@ def _compile(path: Path) -> None:
         compile_core(folder, path)
     except (RuntimeError, OSError) as error:
         reason = str(error).rstrip(".")
-        raise ToolMissingError(f"the C filters are not compiled: {reason}; {REMEDY}") from error
+        raise ToolMissingError(f"the C filters are not compiled: {reason}; then {REMEDY}") from error

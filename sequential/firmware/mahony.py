@@ -35,6 +35,7 @@ class CMahony(FirmwareFilter):
         "rest_constant", "tilt_by_field", "order",
     )  # fmt: skip
     KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias", "rest", "magnetic_disturbance")
+    SHARES_STATE: ClassVar[bool] = True
 
     @property
     def name(self) -> str:

@@ -17,7 +17,7 @@ FIELDS = ("gyro_density", "bias_walk", "tilt_sigma", "heading_sigma", "gate", "b
 
 
 def tilt_settings(design: TiltKalman) -> NDArray[np.float64]:
-    """In the order of the C struct, which takes the gate on the NIS, not its probability."""
+    """In the order of FIELDS; the C struct takes the gate on the NIS, not its probability."""
     gate = design.settings[4]
     return np.array([gate if name == "gate" else float(getattr(design, name)) for name in FIELDS])
 
@@ -43,6 +43,7 @@ class CTiltKalman(FirmwareFilter):
     ENTRY: ClassVar[str] = "tilt_f32"
     FIELDS: ClassVar[tuple[str, ...]] = FIELDS
     KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias")
+    SHARES_STATE: ClassVar[bool] = True
 
     @property
     def name(self) -> str:
@@ -56,5 +57,5 @@ class CTiltKalman(FirmwareFilter):
 
     @property
     def settings(self) -> NDArray[np.float64]:
-        """What the C struct of the settings holds, in its order."""
+        """What the binding takes, in the order of FIELDS."""
         return tilt_settings(self.design)

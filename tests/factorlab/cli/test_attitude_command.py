@@ -61,7 +61,7 @@ def test_every_filter_finds_the_attitude(moved, name):
     found = whole["filters"][name]
     assert found["error_deg"]["total"] < 1.5
     assert found["final_deg"]["roll"] == pytest.approx(np.degrees(angles[-1, 0]), abs=2.0)
-    assert ("nees" in found) == (name in {"error-state", "smoother", "kalman"})
+    assert ("nees" in found) == (name in {"error-state", "smoother", "kalman", "c-error-state"})
 
 
 def test_the_report_and_the_orientation_are_written(moved, tmp_path):

@@ -26,9 +26,9 @@ def checkout(tmp_path, monkeypatch):
     for room in (library, build):
         monkeypatch.setattr(room, "source_folder", lambda: folder)
         monkeypatch.setattr(room, "library_path", lambda: made)
-    library.load_library.cache_clear()
+    library.loaded.cache_clear()
     yield folder, made
-    library.load_library.cache_clear()
+    library.loaded.cache_clear()
 
 
 def test_a_checkout_compiles_itself(checkout, c_compiler):
@@ -43,13 +43,13 @@ def test_what_changed_is_compiled_anew(checkout, c_compiler):
     folder, made = checkout
     library.load_library()
     before = made.stat().st_mtime_ns
-    library.load_library.cache_clear()
+    library.loaded.cache_clear()
     library.load_library()
     assert made.stat().st_mtime_ns == before, "nothing changed"
     header = folder / "core" / "answer.h"
     header.write_text("#define CHANGED 1\nint answer(void);\n")
     os.utime(header, ns=(before + 10**9, before + 10**9))
-    library.load_library.cache_clear()
+    library.loaded.cache_clear()
     library.load_library()
     assert made.stat().st_mtime_ns != before
 

@@ -7,10 +7,10 @@ import pytest
 from attitude_worlds import seen, swinging
 
 from sequential import firmware
-from sequential.attitude import attitude_from_angles
+from sequential.attitude import ErrorStateAttitude, attitude_from_angles
 from sequential.evaluate import attitude_error
 
-FLOAT = [firmware.CMahony, firmware.CTiltKalman, firmware.CComplementary]
+FLOAT = [firmware.CMahony, firmware.CTiltKalman, firmware.CComplementary, firmware.CErrorState]
 FIXED = [firmware.CMahonyFixed]
 EVERY = [*FLOAT, *FIXED]
 each = pytest.mark.parametrize("kind", EVERY, ids=lambda kind: kind.__name__)
@@ -33,12 +33,28 @@ def moved(rng):
 def test_a_recording_gives_what_python_gives(kind, magnetometer, moved):
     ported = kind(magnetometer=magnetometer)
     own, theirs = ported.estimate(moved), type(ported.design)(magnetometer=magnetometer).estimate(moved)
-    apart = attitude_error(own.world_q_body, theirs.world_q_body).errors[:, 0]
-    assert np.degrees(apart.max()) < 0.01
+    apart = np.degrees(attitude_error(own.world_q_body, theirs.world_q_body).errors[:, 0])
+    if kind is firmware.CErrorState:  # it spreads its corrections over the samples after a block
+        assert np.sqrt(np.mean(apart**2)) < 0.02
+        return
+    assert apart.max() < 0.01
     if theirs.rest is not None:
         assert np.count_nonzero(own.rest != theirs.rest) <= 2, "times add up to a rounding"
     if theirs.gyro_bias is not None:
         np.testing.assert_allclose(own.gyro_bias, theirs.gyro_bias, atol=1e-5)
+
+
+@pytest.mark.parametrize("magnetometer", [True, False])
+def test_the_error_state_filter_knows_how_well_it_knows(magnetometer, moved):
+    own = firmware.CErrorState(magnetometer=magnetometer).estimate(moved)
+    theirs = ErrorStateAttitude(magnetometer=magnetometer).estimate(moved)
+    apart = attitude_error(own.heading_free, theirs.heading_free).errors[:, 0]
+    assert np.degrees(np.sqrt(np.mean(apart**2))) < 0.02
+    for name in ("cov", "cov_6d", "gyro_bias_cov"):
+        shares = [np.sqrt(np.trace(getattr(one, name), axis1=1, axis2=2)) for one in (own, theirs)]
+        # a correction comes some samples later than in Python
+        np.testing.assert_allclose(np.median(shares[0] / shares[1]), 1.0, atol=0.01)
+    assert abs(own.gyro_bias[-1] - theirs.gyro_bias[-1]).max() < 1e-5
 
 
 @pytest.mark.parametrize("kind", FIXED, ids=lambda kind: kind.__name__)
