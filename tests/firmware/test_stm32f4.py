@@ -148,8 +148,9 @@ def spoken(image, commands, enough, patience=4.0):
     return frames
 
 
-def test_image_runs_without_a_sensor_and_obeys(stm32f4, qemu):
-    frames = spoken(stm32f4(FILTER="mahony_q", PHASE="0"), b"ab", 60)
+@pytest.mark.parametrize("phase", ["0", "1"])
+def test_image_runs_without_a_sensor_and_obeys(stm32f4, qemu, phase):
+    frames = spoken(stm32f4(FILTER="mahony_q", PHASE=phase), b"ab", 60)
     boot, again = (frame for frame in frames if isinstance(frame, BootFrame))
     assert (boot.target, boot.filter, boot.rate) == ("stm32f4", "mahony_q", 100)
     assert (again.target, again.filter) == (boot.target, boot.filter)

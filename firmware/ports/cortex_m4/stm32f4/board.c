@@ -35,6 +35,7 @@ void raise_events(uint8_t events)
 static void systick_handler(void)
 {
 #if PHASE
+    serial_release(); /* a phase that never came: late is better than never */
     serial_hold();
     TIM2->egr = TIM_EGR_UG; /* from zero */
     TIM2->cr1 = TIM_CR1_CEN | TIM_CR1_OPM | TIM_CR1_URS;
