@@ -205,7 +205,7 @@ void app_step(uint8_t events)
         filter_accel(app.sensor.counts);
         app.prepared = 1;
     }
-    if ((events & BOARD_I2C) != 0U) { /* before the tick: with a tick beside it, it belongs to the period before */
+    if ((events & BOARD_I2C) != 0U) { /* before a tick: it belongs to the period before */
         take(mpu6050_transferred(&app.sensor));
     }
     if ((events & BOARD_TICK) != 0U) {

@@ -1,13 +1,14 @@
 /* The application that every board runs: sensor to filter to serial line, 100 times a second.
  *
- * Each period: the burst of the sensor, the update of the filter, one frame.  The frame's first byte is handed to
- * the board when what the frame says has been computed, the rest is encoded while that byte is on its way.  A
- * period without a sample has its frame too, with the last attitude and FRAME_SAMPLE_MISSING; the filter is told
- * how many periods passed when samples come again.  A boot frame comes first, and whenever `b` is received.
+ * Each period: the burst of the sensor, the update of the filter, one frame.  The frame's first byte is
+ * handed to the board when what the frame says has been computed, the rest is encoded while that byte is on
+ * its way.  A period without a sample has its frame too, with the last attitude and FRAME_SAMPLE_MISSING; the
+ * filter is told how many periods passed when samples come again.  A boot frame comes first, and whenever `b`
+ * is received.
  *
- * What it does with bad input: no sensor: frames say so, from the first period on (attitude: identity).  No room
- * on the serial line: the frame is dropped, uses its number up, and the next one says FRAME_OVERRUN.  A main loop
- * that was late by whole periods: their numbers are used up too.  An unknown command: ignored.
+ * What it does with bad input: no sensor: frames say so, from the first period on (attitude: identity).  No
+ * room on the serial line: the frame is dropped, uses its number up, and the next one says FRAME_OVERRUN.  A
+ * main loop that was late by whole periods: their numbers are used up too.  An unknown command: ignored.
  */
 #ifndef FACTORLAB_APP_H
 #define FACTORLAB_APP_H

@@ -30,7 +30,7 @@ extern "C" {
 #define BOARD_RECEIVED 0x04U /* bytes have come on the serial line */
 #define BOARD_I2C_PART 0x08U /* BOARD_PART bytes of the transfer have been read; a board may never say so */
 
-#define BOARD_PART 6U /* bytes: of a sample, the accelerometer's, which can be worked on while the rest comes */
+#define BOARD_PART 6U /* bytes: of a sample, the accelerometer's, which needs not wait for the rest */
 
 /* How a transfer stands. */
 #define BOARD_I2C_DONE 0U
@@ -58,8 +58,8 @@ uint32_t board_time_us(void);
 
 void board_phase(uint8_t after /* BOARD_AFTER_... */);
 
-/* Writes `write_length` (>= 1) bytes to a device, then, unless `read_length` is 0, reads after a repeated start.
- * Returns at once; BOARD_I2C follows.  Both arrays stay in use until then. */
+/* Writes `write_length` (>= 1) bytes to a device, then, unless `read_length` is 0, reads after a repeated
+ * start.  Returns at once; BOARD_I2C follows.  Both arrays stay in use until then. */
 void board_i2c_start(uint8_t address /* 7 bits */, const uint8_t *write, uint8_t write_length, uint8_t *read,
                      uint8_t read_length);
 uint8_t board_i2c_state(void); /* BOARD_I2C_DONE ... */
@@ -75,8 +75,8 @@ uint8_t board_room(void); /* bytes */
 /* The oldest byte received that was not fetched yet, -1: none. */
 int16_t board_received(void);
 
-/* A pin that is high while the filter is updated; another, not ours, rises when a transfer has ended and falls
- * with the first byte of a frame: an oscilloscope shows cycles and latency. */
+/* A pin that is high while the filter is updated; another, not ours, rises when a transfer has ended and
+ * falls with the first byte of a frame: an oscilloscope shows cycles and latency. */
 void board_mark_update(uint8_t level);
 
 #ifdef __cplusplus

@@ -1,7 +1,8 @@
 /* What all filters in single precision have in common behind filter.h.
  *
- * The file that includes this says which one it is: MODULE its name, KIND its number in a boot frame, STEP and ATTITUDE
- * its functions of these names for a board without magnetometer; it adds `filter_bias` and `filter_status`.
+ * The file that includes this says which one it is: MODULE its name, KIND its number in a boot frame, STEP
+ * and ATTITUDE its functions of these names for a board without magnetometer; it adds `filter_bias` and
+ * `filter_status`.
  */
 #include "../core/frame.h"
 #include "filter.h"

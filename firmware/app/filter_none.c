@@ -1,4 +1,5 @@
-/* No filter: a board that sends raw frames, to be recorded and worked on elsewhere.  Its attitude is the identity. */
+/* No filter: a board that sends raw frames, to be recorded and worked on elsewhere.  Its attitude is the
+ * identity. */
 #include "filter.h"
 
 #include "../core/frame.h"

@@ -1,4 +1,5 @@
-/* What all filters in fixed point have in common behind filter.h; constants are those of 100 samples a second.
+/* What all filters in fixed point have in common behind filter.h; constants are those of 100 samples a
+ * second.
  *
  * The file that includes this says which one it is: MODULE its name, KIND its number in a boot frame; it adds
  * `filter_bias` and `filter_status`.

@@ -7,10 +7,10 @@
  * Start: reset, 100 ms, identity, clock from the gyro, 40 ms, ranges written and read back, then bursts.
  *
  * What it does with bad input:
- * - no answer: the period has no sample; after MPU6050_FAILURES periods in a row the sensor is started anew (it
- *   may have lost its power and with it its ranges).
- * - a transfer that has not ended by the next tick, or a fault on the bus: the bus is freed (nine clocks), the
- *   sensor started anew.
+ * - no answer: the period has no sample; after MPU6050_FAILURES periods in a row the sensor is started
+ *   anew (it may have lost its power and with it its ranges).
+ * - a transfer that has not ended by the next tick, or a fault on the bus: the bus is freed (nine clocks),
+ *   the sensor started anew.
  * - another identity than MPU6050_WHO_AM_I, or ranges that do not read back: no sample; tried again.
  * - all 14 bytes the same MPU6050_STUCK times in a row: no such noise exists, so these are no samples until
  *   something changes; the sensor is started anew.
@@ -62,7 +62,7 @@ struct mpu6050 {
 
 void mpu6050_start(struct mpu6050 *sensor);
 
-/* To be called when a period begins: starts the transfer of this period.  MPU6050_PENDING or MPU6050_NOTHING. */
+/* To be called when a period begins: starts its transfer.  MPU6050_PENDING or MPU6050_NOTHING. */
 uint8_t mpu6050_tick(struct mpu6050 *sensor);
 
 /* May be called when BOARD_PART bytes have been read; 1: `counts` has the accelerometer's three. */

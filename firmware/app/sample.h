@@ -1,7 +1,7 @@
 /* From counts to what a filter takes, and from a float filter to what a frame takes.
  *
- * Constants come from the header that FACTORLAB_CALIBRATION names (`factorlab calibrate ... --c-header`), or from
- * the data sheet.
+ * Constants come from the header that FACTORLAB_CALIBRATION names (`factorlab calibrate ... --c-header`), or
+ * from the data sheet.
  *
  * What it does with bad input: any counts; a float that is not finite or out of range becomes 0.
  */

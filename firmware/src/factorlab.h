@@ -1,7 +1,7 @@
 /* The attitude filters of factorlab for Arduino: one header for a sketch.
  *
- * Sources stand in ../core, where each header says what it computes and what it does with bad input; the files beside
- * this one only bring them to the Arduino builder.
+ * Sources stand in ../core, where each header says what it computes and what it does with bad input; the
+ * files beside this one only bring them to the Arduino builder.
  */
 #ifndef FACTORLAB_H
 #define FACTORLAB_H

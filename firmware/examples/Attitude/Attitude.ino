@@ -3,9 +3,9 @@
  *     $ATT,sequence,t_ms,roll,pitch,yaw*hh        (degrees; hh: checksum as in NMEA 0183)
  *
  * Wiring (Uno, Nano): VCC 5V, GND GND, SDA A4, SCL A5; AD0 open or GND.
- * To see it: a terminal at 500 000 baud, or `factorlab record serial /dev/ttyACM0 --baud 500000 -o imu.csv`.
- * Calibrated: `factorlab calibrate imu ... --c-header calibration.h`, put that file beside this one, and include
- * "calibration.h" instead of the default below.
+ * To see it: a terminal at 500 000 baud, or `factorlab record serial /dev/ttyACM0 -o attitude.csv`.
+ * Calibrated: `factorlab calibrate imu ... --c-header calibration.h`, put that file beside this one, and
+ * include "calibration.h" instead of the default below.
  */
 #include <Wire.h>
 #include <factorlab.h>

@@ -1,7 +1,7 @@
 /* Ticks, phase and sleep: TIMER1 counts half microseconds from 0 to 19 999.
  *
- * Compare A ends the period; compare B is the phase at which a frame may begin to leave.  The timer needs nobody:
- * its period is 160 000 cycles whatever the program does.
+ * Compare A ends the period; compare B is the phase at which a frame may begin to leave.  The timer needs
+ * nobody: its period is 160 000 cycles whatever the program does.
  */
 #include <avr/interrupt.h>
 #include <avr/power.h>
@@ -67,7 +67,7 @@ uint8_t board_wait(void)
     cli();
     while ((taken = EVENTS & (uint8_t)~_BV(HELD)) == 0U) {
         sleep_enable();
-        sei(); /* the instruction after it is carried out before any interrupt: none can slip in before sleep */
+        sei(); /* no interrupt comes before the instruction after it, which is sleep */
         sleep_cpu();
         sleep_disable();
         cli();

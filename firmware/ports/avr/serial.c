@@ -1,7 +1,7 @@
 /* The serial line: 8 data bits, no parity, one stop bit; rings and interrupts both ways.
  *
- * Baud: 250 000, 500 000 and 1 000 000 divide 16 MHz exactly; 115 200 becomes 117 647, +2.1 %, which most receivers
- * still take.
+ * Baud: 250 000, 500 000 and 1 000 000 divide 16 MHz exactly; 115 200 becomes 117 647, +2.1 %, which most
+ * receivers still take.
  */
 #include <avr/interrupt.h>
 
@@ -48,9 +48,10 @@ ISR(USART_UDRE_vect)
 
 ISR(USART_RX_vect)
 {
+    uint8_t broken = UCSR0A & _BV(FE0); /* no stop bit: another baud, or a line that floats */
     uint8_t byte = UDR0;
     uint8_t next = (received.head + 1U) & (RECEIVED - 1U);
-    if (next != received.tail) {
+    if (broken == 0U && next != received.tail) {
         received.bytes[received.head] = byte;
         received.head = next;
         EVENTS |= BOARD_RECEIVED;

@@ -2,11 +2,12 @@
  *
  *     simulate IMAGE.elf SAMPLES RECORDS [--send BYTES] [--faults FILE] [--who-am-i N] [--real-time]
  *
- * SAMPLES: int16 little endian, rows ax ay az temperature gx gy gz, 100 a second, served as an MPU-6050 (slave.h).
- * RECORDS: one `struct record` for each byte on the serial line, each edge of the marker pins, each row served.
- * --send: bytes that the board receives once it has said something.  --faults: one byte a row (slave.h).
+ * SAMPLES: int16 little endian, rows ax ay az temperature gx gy gz, 100 a second, served as by an MPU-6050.
+ * RECORDS: a `struct record` for each byte on the serial line, edge of the marker pins, and row served.
+ * --send: bytes that the board receives once it has said something.
+ * --faults: one byte a row (slave.h).
  * --real-time: no faster than a board; the serial line is a pseudo-terminal, whose name is printed first;
- * RECORDS may be /dev/null.
+ *     RECORDS may be /dev/null.
  * Printed at the end, as one JSON object: cycles run, cycles asleep, bytes of stack used, rows served.
  */
 #include <stdarg.h>
@@ -149,12 +150,13 @@ static void *whole(const char *path, size_t *size)
 
 static uint64_t last_cycle(const struct slave *slave)
 {
-    return slave->first != 0 ? slave->first + slave->rows * PERIOD - 1U : (slave->rows + START_PERIODS) * PERIOD;
+    uint64_t rows = slave->rows * PERIOD;
+    return slave->first != 0 ? slave->first + rows - 1U : rows + START_PERIODS * PERIOD;
 }
 
 int main(int argc, char **argv)
 {
-    struct slave slave = {.period = PERIOD, .served = on_row};
+    static struct slave slave = {.period = PERIOD, .served = on_row};
     uint8_t who_am_i = 0x68;
     size_t size;
     int state = cpu_Running;
@@ -193,7 +195,7 @@ int main(int argc, char **argv)
         state = avr_run(avr);
     }
     printf("{\"cycles\": %llu, \"asleep\": %llu, \"stack\": %u, \"rows\": %llu, \"crashed\": %s}\n",
-           (unsigned long long)avr->cycle, (unsigned long long)asleep, stack_used(), (unsigned long long)served,
-           state == cpu_Done || state == cpu_Crashed ? "true" : "false");
+           (unsigned long long)avr->cycle, (unsigned long long)asleep, stack_used(),
+           (unsigned long long)served, state == cpu_Done || state == cpu_Crashed ? "true" : "false");
     return fclose(records) == 0 ? 0 : 1;
 }

@@ -12,7 +12,8 @@
 /* The row whose time this is. */
 static size_t row_now(const struct slave *slave)
 {
-    return slave->first == 0 ? 0 : (size_t)((slave->avr->cycle - slave->first + slave->period / 2) / slave->period);
+    uint64_t since = slave->avr->cycle - slave->first;
+    return slave->first == 0 ? 0 : (size_t)((since + slave->period / 2) / slave->period);
 }
 
 static enum slave_fault fault_now(const struct slave *slave)
@@ -103,7 +104,8 @@ static void on_bus(avr_irq_t *irq, uint32_t value, void *param)
     avr_cycle_timer_register(slave->avr, 1, keep_time, slave);
     if (what & TWI_COND_START) {
         enum slave_fault fault = fault_now(slave);
-        slave->chosen = (message.u.twi.addr >> 1) == ADDRESS && fault != SLAVE_ABSENT ? message.u.twi.addr : 0;
+        uint8_t ours = (message.u.twi.addr >> 1) == ADDRESS;
+        slave->chosen = ours && fault != SLAVE_ABSENT ? message.u.twi.addr : 0;
         slave->named = 0;
         slave->hangs = fault == SLAVE_HUNG;
         if (slave->chosen) {

@@ -1,11 +1,12 @@
-/* An MPU-6050 on simulated I2C that gives recorded samples, at the time at which the real one would have had them.
+/* An MPU-6050 on simulated I2C that gives recorded samples when the real one would have had them.
  *
- * The first burst from 0x3B is answered with row 0; from then on a burst is answered with the row of its time, 100
- * a second, so rows that nobody fetched are lost, as on a board.  Registers that were written read back.
+ * The first burst from 0x3B is answered with row 0; from then on a burst is answered with the row of its
+ * time, 100 a second, so rows that nobody fetched are lost, as on a board.  Registers that were written read
+ * back.
  * Bytes take the time that the bit rate asks for (simavr's own I2C takes 9 us for each, whatever it says).
  *
- * Faults, one byte a row: SLAVE_ABSENT does not acknowledge its address, SLAVE_HUNG acknowledges and then holds the
- * clock low for ever (until the master gives the bus up).
+ * Faults, one byte a row: SLAVE_ABSENT does not acknowledge its address, SLAVE_HUNG acknowledges and then
+ * holds the clock low for ever (until the master gives the bus up).
  */
 #ifndef FACTORLAB_SLAVE_H
 #define FACTORLAB_SLAVE_H
