@@ -1,6 +1,7 @@
 """`factorlab record serial` on the image for the ATmega328P, run in real time behind a pseudo-terminal."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from factorlab.firmware.avr import emulate_avr, live_avr
 from factorlab.firmware.emulation import mpu6050_counts
 from sequential.readers import read_imu
 from sequential.sensors import simulate_imu, tumble
+from sequential.sensors.calibration_header import c_header, calibration_hash, nominal_calibration
 
 SECONDS = 1.5
 
@@ -79,3 +81,17 @@ def test_attitudes_are_those_of_the_same_image_run_ahead_of_time(
             np.testing.assert_allclose(row[1:5], q / np.linalg.norm(q), atol=1e-8)
         else:
             np.testing.assert_allclose(row[5:8], np.degrees(frame.roll_pitch_yaw), atol=1e-4)
+
+
+def test_the_board_carries_the_hash_of_its_calibration(avr_image, avr_simulator, counts, tmp_path):
+    """From calibration.json to the header, into the image, out of its boot frame, back to the file."""
+    calibration = replace(nominal_calibration(), mag=None)
+    calibration.save(tmp_path / "calibration.json")
+    (tmp_path / "calibration.h").write_text(c_header(calibration), encoding="utf-8")
+    image = avr_image(FILTER="mahony_q", CALIBRATION=str(tmp_path / "calibration.h"))
+    with live_avr(image, counts, simulator=avr_simulator) as port:
+        options = "-o", str(tmp_path / "imu.csv"), "--calibration", str(tmp_path / "calibration.json")
+        done = CliRunner().invoke(main, ["record", "serial", port, "--seconds", "0.5", *options])
+    assert done.exit_code == 0, done.output
+    assert "warn" not in done.output
+    assert f"calibration {calibration_hash(calibration):08x}" in done.stdout
