@@ -50,7 +50,13 @@ def recorded_rows(counts: ArrayLike, *, mode: str, faults: ArrayLike | None = No
     return rows
 
 
-def build_host(out: Path, *, filter: str = "mahony_q", calibration: Path | None = None) -> Path:  # noqa: A002
+def build_host(
+    out: Path,
+    *,
+    filter: str = "mahony_q",  # noqa: A002 - the word of the Makefiles
+    calibration: Path | None = None,
+    core: Path | None = None,
+) -> Path:
     """Compile the application for this computer into the folder `out`; the program.
 
     Parameters
@@ -58,6 +64,7 @@ def build_host(out: Path, *, filter: str = "mahony_q", calibration: Path | None 
     out : folder
     filter : of firmware/app/filter_*.c
     calibration : header of constants, as `factorlab calibrate … --c-header` writes them
+    core : folder of the objects of firmware/core, for programs that share them; `out` unless given
 
     Raises
     ------
@@ -65,8 +72,9 @@ def build_host(out: Path, *, filter: str = "mahony_q", calibration: Path | None 
         where make or a compiler is missing, or refuses.
     """
     asked = [f"OUT={out.resolve()}", f"FILTER={filter}", f"CALIBRATION={calibration or ''}"]
+    asked.append(f"CORE_OUT={(core or out).resolve()}")
     run_tool(
-        ["make", "-C", str(firmware_folder() / "ports" / "host"), *asked],
+        ["make", "-s", "-j2", "-C", str(firmware_folder() / "ports" / "host"), *asked],
         what=f"compiling {filter} for this computer",
     )
     return out / "firmware"

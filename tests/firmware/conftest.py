@@ -42,13 +42,18 @@ def m4_image(
 ) -> Callable[..., Path]:
     """Build firmware.elf of ports/cortex_m4 with variables of its Makefile: m4_image(FILTER="none")."""
     built: dict[tuple[tuple[str, str], ...], Path] = {}
+    core = tmp_path_factory.mktemp("m4_core")
 
     def build(**variables: str) -> Path:
         key = tuple(sorted(variables.items()))
         if key not in built:
             out = tmp_path_factory.mktemp("m4")
-            words = [f"{name}={value}" for name, value in variables.items()]
-            run_tool(["make", "-s", "-C", str(firmware_dir / "ports" / "cortex_m4"), f"OUT={out}", *words])
+            words = [
+                f"OUT={out}",
+                f"CORE_OUT={core}",
+                *(f"{name}={value}" for name, value in variables.items()),
+            ]
+            run_tool(["make", "-s", "-j2", "-C", str(firmware_dir / "ports" / "cortex_m4"), *words])
             built[key] = out / "firmware.elf"
         return built[key]
 
@@ -59,8 +64,10 @@ def m4_image(
 def host_program(c_compiler: str, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Build the application with a filter for this computer: host_program("mahony_q")."""
 
+    core = tmp_path_factory.mktemp("host_core")
+
     @cache
     def build(name: str) -> Path:
-        return build_host(tmp_path_factory.mktemp("host"), filter=name)
+        return build_host(tmp_path_factory.mktemp("host"), filter=name, core=core)
 
     return build

@@ -9,8 +9,10 @@ from factorlab.datasets.recordings import open_recording
 from factorlab.firmware.avr import emulate_avr
 from factorlab.firmware.emulation import mpu6050_counts
 from factorlab.firmware.m4 import emulate_m4
-from factorlab.firmware.recorded import FAULTS, run_host
+from factorlab.firmware.recorded import FAULTS, build_host, run_host
+from factorlab.firmware.toolchain import run_tool
 from sequential.readers.serial import Status, decode
+from sequential.sensors import AffineCalibration, ImuCalibration, c_header
 
 RECORDINGS = ("broad:07", "broad:16", "broad:21", "broad:34", "broad:01", "broad:29")
 APPLICATION = Path(__file__).resolve().parents[2] / "firmware" / "app"
@@ -101,3 +103,29 @@ def test_three_machines_send_the_same_frames(
     np.testing.assert_array_equal(m4.world_q_body, [one.world_q_body for one in host[-len(counts) :]])
     assert [one.bias for one in avr.frames] == [one.bias for one in m4.frames]
     assert [one.status for one in avr.frames] == [one.status for one in m4.frames]
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_no_double_arithmetic_is_linked(m4_image, name):
+    linked = run_tool(["arm-none-eabi-nm", str(m4_image(FILTER=name))])
+    assert "filter_update" in linked
+    assert "__aeabi_d" not in linked
+    assert "__aeabi_f2d" not in linked
+
+
+def test_constants_of_a_calibration_are_built_in(m4_image, qemu, tmp_path, recorded_counts, rng):
+    def imperfect(kind, scale, unit):
+        matrix = scale * (np.eye(3) + rng.normal(0, 0.02, (3, 3)))
+        offset = rng.normal(0, 50, 3)
+        return AffineCalibration(matrix, offset, kind=kind, unit_in="counts", unit_out=unit)
+
+    gyro, accel = imperfect("gyro", 1.0653e-3, "rad/s"), imperfect("accel", 2.3942e-3, "m/s^2")
+    header = tmp_path / "constants.h"
+    header.write_text(c_header(ImuCalibration(gyro=gyro, accel=accel)), encoding="utf-8")
+    counts = recorded_counts[:1500]
+    emulation = emulate_m4(m4_image(FILTER="mahony_q", CALIBRATION=str(header)), counts)
+    host = build_host(tmp_path / "host", filter="mahony_q", calibration=header)
+    assert_same_bytes(emulation.data, run_host(host, counts))
+    assert emulation.boot.calibration_hash != 0
+    without = emulate_m4(m4_image(FILTER="mahony_q"), counts)
+    assert np.abs(emulation.world_q_body - without.world_q_body).max() > 0.01
