@@ -46,4 +46,19 @@ def _places() -> dict[str, str]:
     folder = data or "not set: mrclam is not available"
     if data and not Path(data).is_dir():
         folder = f"{data} is not a folder"
-    return {"kitti, plaza": wheel, "FACTORLAB_DATA": folder}
+    return {"kitti, plaza": wheel, "FACTORLAB_DATA": folder, **_boards()}
+
+
+def _boards() -> dict[str, str]:
+    """What building, emulating and recording from a board take; none of it is needed for anything else."""
+    from factorlab.firmware.toolchain import TARGETS, missing_tools
+    from factorlab.versions import version_of
+
+    found = {}
+    for target in TARGETS:
+        lacking = missing_tools(target, emulate=True)
+        found[f"firmware {target}"] = (
+            f"apt install {' '.join(lacking)}" if lacking else "compiler and emulator"
+        )
+    port = version_of("pyserial", "")
+    return {**found, "serial ports": f"pyserial {port}" if port else "pip install 'factorlab[live]'"}

@@ -270,3 +270,10 @@ def test_the_speed_is_found_out(core, tmp_path, monkeypatch):
         assert (told["samples"], told["lost"], told["discarded"]) == (100, 0, 0)
         done = record(board.port, tmp_path / "other.csv", "--baud", "57600", "--wait", "0.3")
     assert "no frame among them at 57600 bit/s" in done.stderr
+
+
+def test_doctor_says_what_boards_take():
+    done = CliRunner().invoke(main, ["doctor", "--json"])
+    places = json.loads(done.stdout)["places"]
+    assert places["serial ports"].startswith("pyserial 3")
+    assert {"firmware avr", "firmware m4"} <= set(places)
