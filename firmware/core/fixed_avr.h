@@ -150,7 +150,7 @@ static inline __attribute__((always_inline)) int32_t mul32x16_q(int32_t a, int16
 }
 
 /* a b / 2^24, rounded, b < 2^24: 70 cycles. */
-static inline __attribute__((always_inline)) int32_t mul32u24_q(int32_t a, uint32_t b)
+static __attribute__((noinline, unused)) int32_t mul32u24_q(int32_t a, uint32_t b)
 {
     int32_t product;
     uint8_t zero;
@@ -161,7 +161,7 @@ static inline __attribute__((always_inline)) int32_t mul32u24_q(int32_t a, uint3
             "clr  %B[t]         \n\t"
             "mul  %B[a], %C[b]  \n\t"
             "movw %A[p], r0     \n\t"
-            "mulsu %D[a], %C[b] \n\t"
+            "mulsu %[h], %C[b] \n\t"
             "movw %C[p], r0     \n\t"
             "mul  %A[a], %B[b]  \n\t"
             "add  %A[t], r0     \n\t"
@@ -191,7 +191,7 @@ static inline __attribute__((always_inline)) int32_t mul32u24_q(int32_t a, uint3
             "adc  %B[p], %[z]   \n\t"
             "adc  %C[p], %[z]   \n\t"
             "adc  %D[p], %[z]   \n\t"
-            "mulsu %D[a], %A[b] \n\t"
+            "mulsu %[h], %A[b] \n\t"
             "sbc  %C[p], %[z]   \n\t"
             "sbc  %D[p], %[z]   \n\t"
             "add  %A[p], r0     \n\t"
@@ -203,7 +203,7 @@ static inline __attribute__((always_inline)) int32_t mul32u24_q(int32_t a, uint3
             "adc  %B[p], r1     \n\t"
             "adc  %C[p], %[z]   \n\t"
             "adc  %D[p], %[z]   \n\t"
-            "mulsu %D[a], %B[b] \n\t"
+            "mulsu %[h], %B[b] \n\t"
             "sbc  %D[p], %[z]   \n\t"
             "add  %B[p], r0     \n\t"
             "adc  %C[p], r1     \n\t"
@@ -219,7 +219,7 @@ static inline __attribute__((always_inline)) int32_t mul32u24_q(int32_t a, uint3
             "adc  %D[p], %[z]   \n\t"
             "clr  r1            \n\t"
             : [p] "=&r"(product), [z] "=&r"(zero), [t] "=&r"(below)
-            : [a] "a"(a), [b] "a"(b)
+            : [a] "r"(a), [h] "a"((uint8_t)((uint32_t)a >> 24)), [b] "a"(b)
             : "r0");
     return product;
 }

@@ -103,6 +103,8 @@ static inline int32_t abs_q(int32_t x) { return x < 0 ? -x : x; }
 /* 2^31 / sqrt(x) for 2^30 <= x < 2^32: too small by 1 part in 1 800 to 28 000. */
 uint16_t inverse_sqrt_q(uint32_t x);
 
+extern const uint16_t inverse_roots_q[49]; /* in flash, see flash.h */
+
 /* sqrt(x): too small by at most 1 part in 1 600 and 1. */
 uint16_t sqrt_q(uint32_t x);
 

@@ -54,39 +54,43 @@ struct mahony_q_settings {
     float rest_constant;  /* s */
 };
 
+/* What one sample counts for. */
+struct mahony_q_weights {
+    uint16_t low;      /* in the low-passes, Q16 */
+    uint16_t rest;     /* in the bias at rest, Q16 */
+    uint16_t lasting;  /* in the lasting error, Q24 */
+    uint16_t integral; /* k_I times the time it stands for, s^-1, Q26 */
+    uint8_t periods;   /* that it stands for */
+};
+
 /* What the settings are at one rate. */
 struct mahony_q_derived {
-    uint32_t half_period;    /* s, Q31 */
-    int32_t bias_limit;      /* rad/s, Q32 */
-    int32_t rest_gyro;       /* rad/s, Q24 */
-    int32_t rest_accel;      /* m/s^2, Q16 */
-    uint16_t gain;           /* k_P times half a period, Q18 */
-    uint16_t boost;          /* what is added to `gain` for each period that is left of the start, Q26 */
-    uint16_t integral_gain;  /* k_I times a period, s^-1, Q26 */
-    uint16_t error_limit;    /* sine, Q14 */
-    uint16_t lasting_keep;   /* weight of one sample in the lasting error, Q24 */
-    uint16_t low_keep;       /* weight of one sample in the low-passes, Q16 */
-    uint16_t rest_keep;      /* weight of one sample in the bias at rest, Q16 */
-    uint16_t low_periods;    /* time constant of the low-passes, periods */
-    uint16_t constant_periods; /* time constant of the bias at rest, periods */
-    uint16_t start_periods;  /* of quick start, periods */
-    uint16_t rest_periods;   /* still for more of them: at rest, periods */
-    uint16_t pause_periods;  /* nothing is integrated over more, periods */
-    int8_t gyro_limit;       /* rad/s */
+    uint32_t half_period;            /* s, Q31 */
+    int32_t bias_limit;              /* rad/s, Q32 */
+    int32_t rest_gyro;               /* rad/s, Q24 */
+    int32_t rest_accel;              /* m/s^2, Q16 */
+    struct mahony_q_weights weights; /* of a sample that stands for one period */
+    uint16_t gain;                   /* k_P times half a period, Q18 */
+    uint16_t boost;                  /* what is added to `gain` for each period left of the start, Q26 */
+    uint16_t error_limit;            /* sine, Q14 */
+    uint16_t low_periods;            /* time constant of the low-passes, periods */
+    uint16_t constant_periods;       /* time constant of the bias at rest, periods */
+    uint16_t start_periods;          /* of quick start, periods */
+    uint16_t rest_periods;           /* still for so many: at rest, periods */
+    uint16_t pause_periods;          /* nothing is integrated over more, periods */
+    int8_t gyro_limit;               /* rad/s */
 };
 
 struct mahony_q_state {
     int32_t q[4];            /* world_q_body: w x y z, Q30 */
     int32_t bias[3];         /* of the gyro, rad/s, Q32 */
     int32_t gyro_low[3];     /* low-passed, rad/s, Q24 */
-    int16_t accel_low[3];    /* low-passed, m/s^2, Q8 */
-    int16_t lasting[2];      /* lasting error in the world, east and north, sine, Q14 */
-    uint16_t start_left;     /* of quick start, periods */
-    uint16_t still;          /* for so long, periods */
-    uint8_t accel_below[3];  /* what accel_low has below Q8, Q16 */
-    uint8_t lasting_below[2]; /* what lasting has below Q14, Q22 */
+    uint8_t accel_low[3][3]; /* low-passed, m/s^2, Q16 in 24 bits, lowest byte first */
+    uint8_t lasting[2][3];   /* lasting error, east and north, sine, Q22 in 24 bits, lowest byte first */
     uint8_t turn_left[3];    /* what the turns left over, half angle, rad, Q24 */
     uint8_t status;          /* MAHONY_Q_REST ... */
+    uint16_t start_left;     /* of quick start, periods */
+    uint16_t still;          /* for so long, periods */
 };
 
 /* bits of the status: those of frame.h */

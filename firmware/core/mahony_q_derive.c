@@ -37,19 +37,20 @@ void mahony_q_derive(const struct mahony_q_settings *settings, uint16_t rate_hz,
     const float boost = (settings->start_gain - settings->gain) / (2.0F * rate);
     d->half_period = (uint32_t)((0x40000000UL + hz / 2U) / hz);
     d->bias_limit = (int32_t)fixed(settings->bias_limit, 32, 0x3D70A3D7UL);
-    d->rest_gyro = (int32_t)fixed(settings->rest_gyro, 24, 0x3FFFFFFFUL);
-    d->rest_accel = (int32_t)fixed(settings->rest_accel, 16, 0x3FFFFFFFUL);
+    d->rest_gyro = (int32_t)fixed(settings->rest_gyro, 24, 0x7FFFFFUL);
+    d->rest_accel = (int32_t)fixed(settings->rest_accel, 16, 0x3FFFFFUL);
     d->start_periods = (uint16_t)fixed(start_periods, 0, UINT16_MAX);
     d->gain = (uint16_t)fixed(settings->gain / (2.0F * rate), 18, 20000U);
     d->boost = (uint16_t)fixed(d->start_periods > 0U ? boost / start_periods : 0.0F, 26, UINT16_MAX);
-    d->integral_gain = (uint16_t)fixed(settings->integral_gain / rate, 26, UINT16_MAX);
+    d->weights.integral = (uint16_t)fixed(settings->integral_gain / rate, 26, UINT16_MAX);
     d->error_limit = (uint16_t)fixed(settings->error_limit, 14, 19000U);
-    d->lasting_keep = (uint16_t)fixed(1.0F / (settings->lasting_time * rate + 1.0F), 24, UINT16_MAX);
-    d->low_keep = (uint16_t)fixed(1.0F / (LOW_TIME * rate + 1.0F), 16, UINT16_MAX);
-    d->rest_keep = (uint16_t)fixed(1.0F / (settings->rest_constant * rate + 1.0F), 16, UINT16_MAX);
+    d->weights.lasting = (uint16_t)fixed(1.0F / (settings->lasting_time * rate + 1.0F), 24, UINT16_MAX);
+    d->weights.low = (uint16_t)fixed(1.0F / (LOW_TIME * rate + 1.0F), 16, UINT16_MAX);
+    d->weights.rest = (uint16_t)fixed(1.0F / (settings->rest_constant * rate + 1.0F), 16, UINT16_MAX);
     d->low_periods = (uint16_t)fixed(LOW_TIME * rate, 0, UINT16_MAX);
     d->constant_periods = (uint16_t)fixed(settings->rest_constant * rate, 0, UINT16_MAX);
     d->rest_periods = (uint16_t)fixed(settings->rest_time * rate, 0, UINT16_MAX);
     d->pause_periods = (uint16_t)(PAUSE * hz > 254U ? 254U : PAUSE * hz);
+    d->weights.periods = 1;
     d->gyro_limit = (int8_t)(hz < 92U ? 7U * hz / 10U : 64U);
 }

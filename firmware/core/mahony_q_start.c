@@ -61,12 +61,13 @@ static void level(const int16_t accel[3], int32_t q[4])
 
 void mahony_q_start(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *first)
 {
-    const struct mahony_q_state empty = {{ONE_Q30, 0, 0, 0}, {0}, {0}, {0}, {0}, 0, 0, {0}, {0}, {0}, 0};
+    const struct mahony_q_state empty = {{ONE_Q30, 0, 0, 0}, {0}, {0}, {{0}}, {{0}}, {0}, 0, 0, 0};
     *s = empty;
     level(first->accel, s->q);
     for (uint8_t i = 0; i < 3; i++) {
         s->gyro_low[i] = first->gyro[i];
-        s->accel_low[i] = first->accel[i];
+        s->accel_low[i][1] = (uint8_t)first->accel[i];
+        s->accel_low[i][2] = (uint8_t)((uint16_t)first->accel[i] >> 8);
         s->turn_left[i] = 0x80; /* half of its unit: the turns round */
     }
     s->start_left = d->start_periods;

@@ -110,3 +110,4 @@ void turn_q(int32_t q[4], const int32_t half[3], uint8_t left[3], int16_t short_
     turn(q, h, (int16_t)(short_of - (int16_t)(squared >> 17)));
 }
 
+
