@@ -10,7 +10,7 @@ from factorlab.firmware.toolchain import firmware_folder, require_tools, run_too
 from sequential.errors import DataError
 from sequential.sensors import ImuCalibration
 
-__all__ = ["BOARDS", "DEFAULT_FILTER", "FLASH", "Image", "build", "filters_of"]
+__all__ = ["BOARDS", "DEFAULT_FILTER", "FLASH", "Image", "build", "constants_header", "filters_of"]
 
 # by target: the folder of its Makefile, and the tool that measures what it makes
 PORTS = {"m4": ("ports/cortex_m4", "arm-none-eabi-size"), "avr": ("ports/avr", "avr-size")}
@@ -107,7 +107,7 @@ def build(
         if target == "m4":
             options.append(f"BOARD={board}")
         if calibration is not None:
-            options.append(f"CALIBRATION={_header(calibration, Path(scratch))}")
+            options.append(f"CALIBRATION={constants_header(calibration, Path(scratch))}")
         make = ["make", "-j2", "--no-print-directory", "-C", str(firmware_folder() / folder), *options]
         run_tool(make, what=f"building {filter} for {board}")
     path = out / "firmware.elf"
@@ -115,8 +115,8 @@ def build(
     return Image(path, target, board, filter, text, data, bss, path.with_suffix(".map"))
 
 
-def _header(calibration: ImuCalibration, folder: Path) -> Path:
-    """The constants as C."""
+def constants_header(calibration: ImuCalibration, folder: Path) -> Path:
+    """Write the constants as C into a folder; the file."""
     from sequential.sensors import c_header
 
     path = folder / "calibration.h"

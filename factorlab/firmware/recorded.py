@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from factorlab.firmware.emulation import COMMANDS
+from factorlab.firmware.emulation import COMMANDS, Emulation
 from factorlab.firmware.toolchain import firmware_folder, run_tool
 from sequential.errors import DataError, ShapeError
+from sequential.readers.serial import BootFrame, Frame, decode
 
-__all__ = ["FAULTS", "ROW", "build_host", "recorded_rows", "run_host"]
+__all__ = ["FAULTS", "ROW", "build_host", "frames_unlike", "recorded_rows", "run_host"]
 
 ROW = np.dtype([("counts", "<i2", 7), ("answer", "u1"), ("command", "u1")])
 FAULTS = {"good": 0, "absent": 1, "hung": 2, "bus": 3}
@@ -96,3 +98,22 @@ def run_host(program: Path, counts: ArrayLike, *, mode: str = "q", faults: Array
         rows.tofile(source)
         run_tool([str(program.resolve()), str(source), str(sink), mode], what=f"running {program.name}")
         return sink.read_bytes()
+
+
+def frames_unlike(emulation: Emulation, host: bytes) -> int:
+    """Frames of an emulated board that say something else than this computer's: attitude, bias, status.
+
+    Sequence numbers and times are left out: boards start in their own time.  So are frames that were lost.
+
+    Parameters
+    ----------
+    emulation : of N samples
+    host : from `run_host` on the same samples, in the same mode
+    """
+    frames = [frame for frame in decode(host) if not isinstance(frame, BootFrame)]
+    pairs = zip(emulation.frames, frames[-len(emulation.frames) :], strict=True)
+    return sum(said is not None and _said(said) != _said(ours) for said, ours in pairs)
+
+
+def _said(frame: Frame) -> Frame:
+    return frame if isinstance(frame, BootFrame) else replace(frame, sequence=0, t_us=0)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.attitude import Reference, Solved
-from factorlab.firmware.build import Image, build
+from factorlab.firmware.build import Image, build, constants_header
 from factorlab.firmware.emulation import Emulation, mpu6050_counts
+from factorlab.firmware.recorded import build_host, frames_unlike, run_host
 from sequential.attitude import AttitudeHistory, attitude_from_angles
 from sequential.errors import DataError
 from sequential.evaluate import attitude_error
@@ -42,6 +43,7 @@ class Trial:
     model : the Python filter on the same samples; None where the image has no filter
     apart : (N,) angle between both, degrees
     solved : both, for figures; with errors where there is a truth
+    unlike : frames that say something else than the same application on this computer
     """
 
     image: Image
@@ -50,6 +52,7 @@ class Trial:
     model: AttitudeHistory | None
     apart: Array | None
     solved: tuple[Solved, ...]
+    unlike: int
 
 
 def run_trial(
@@ -83,6 +86,9 @@ def run_trial(
         made = build(target, image or Path(scratch), filter=filter, calibration=calibration)
         counts = mpu6050_counts(recording)
         emulation = _emulate(made, counts, mode)
+        constants = None if calibration is None else constants_header(calibration, Path(scratch))
+        host = build_host(Path(scratch) / "host", filter=made.filter, calibration=constants)
+        unlike = frames_unlike(emulation, run_host(host, counts, mode=mode))
     there = np.array([frame is not None for frame in emulation.frames])
     if there.sum() < 2:
         raise DataError(f"the image for {made.board} sent {there.sum()} frames for {len(counts)} samples")
@@ -90,9 +96,8 @@ def run_trial(
     path = emulation.world_q_body if mode == "q" else attitude_from_angles(emulation.roll_pitch_yaw)
     norms = np.linalg.norm(path[there], axis=1, keepdims=True)
     board = AttitudeHistory(t[there], path[there] / np.where(norms > 0, norms, 1.0), name=made.filter)
-    return _compared(
-        made, emulation, board, as_read(counts, t, recording.name, calibration), there, truth, recording
-    )
+    read = as_read(counts, t, recording.name, calibration)
+    return _compared(made, emulation, board, read, there, truth, recording, unlike)
 
 
 def _emulate(image: Image, counts: NDArray[np.int16], mode: str) -> Emulation:
@@ -135,13 +140,14 @@ def _compared(
     there: NDArray[np.bool_],
     truth: Reference | None,
     recording: ImuRecording,
+    unlike: int,
 ) -> Trial:
     """Beside the Python filter, and the truth where there is one."""
     from factorlab.attitude import make_estimator
 
     module, _, kind = image.filter.rpartition("_")
     if module not in MODELS:
-        return Trial(image, emulation, board, None, None, ())
+        return Trial(image, emulation, board, None, None, (), unlike)
     model_name, port_name = MODELS[module]
     port_name += "-q" if kind == "q" else ""
     whole = make_estimator(model_name).estimate(read)
@@ -155,4 +161,4 @@ def _compared(
             seen, where = truth.world_q_body[rows], truth.where[rows]
             error = attitude_error(history.world_q_body, seen, where, heading_offset="mean")
         solved.append(Solved(name, history, 0.0, error))
-    return Trial(image, emulation, board, model, apart, tuple(solved))
+    return Trial(image, emulation, board, model, apart, tuple(solved), unlike)

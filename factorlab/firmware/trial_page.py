@@ -50,6 +50,7 @@ def _verdicts(trial: Trial) -> list[Verdict]:
             "" if lost == 0 else "a faster line: BAUD=500000 in the port's Makefile",
         )
     ]  # fmt: skip
+    found.append(_same_bits(trial, count))
     if trial.apart is not None:
         rms, worst = float(np.sqrt(np.mean(trial.apart**2))), float(trial.apart.max())
         good = rms <= APART[0] and worst <= APART[1]
@@ -82,6 +83,16 @@ def _verdicts(trial: Trial) -> list[Verdict]:
             Verdict("stack used at most", emulation.stack, None, status, f"{free} B stay free", unit="B")
         )
     return found
+
+
+def _same_bits(trial: Trial, count: int) -> Verdict:
+    """Fixed point is the same everywhere; so are floats, but for the AVR's, which round on their own."""
+    exact = trial.image.target == "m4" or trial.image.filter.endswith("_q")
+    same = trial.unlike == 0
+    status: Status = "PASS" if same else "FAIL" if exact else "INFO"
+    meaning = f"of {count}, beside the same application compiled for this computer"
+    action = "" if same or not exact else "python -m pytest tests/firmware/test_agree.py tells the module"
+    return Verdict("frames unlike this computer's", trial.unlike, None, status, meaning, action)
 
 
 def _times(trial: Trial) -> list[Verdict]:
@@ -166,7 +177,7 @@ def _numbers(trial: Trial, recording: str) -> dict[str, Any]:
         "filter": image.filter,
         "mode": emulation.mode,
         "samples": len(emulation.frames),
-        "frames": {"lost": emulation.lost, "corrupt": emulation.corrupt},
+        "frames": {"lost": emulation.lost, "corrupt": emulation.corrupt, "unlike_host": trial.unlike},
         f"update_{UNIT[image.target]}": _spread(emulation.update_cycles),
         "latency_us": _spread(1e6 * emulation.latency),
         "jitter_us": _spread(1e6 * emulation.jitter),
