@@ -116,28 +116,33 @@ int16_t asin_q(int32_t sine)
     return atan2_q(sine, (int32_t)((root + (uint32_t)divide_q(square, root)) << (15U - halvings)));
 }
 
-int32_t sin_q(uint32_t angle)
+int32_t cosine_q(uint32_t square, uint16_t *shortage)
 {
-    uint32_t up = (angle & UINT32_C(0x80000000)) != 0 ? UINT32_C(0) - angle : angle; /* the lower half turn is the upper one, negative */
-    uint16_t x;
-    uint16_t u;
-    uint16_t p;
-    int32_t sine;
+    const uint16_t u = (uint16_t)(square >> 16);
+    const uint16_t u2 = mulu16_q(u, u);
+    const uint16_t u3 = mulu16_q(u2, u);
 
-    if (up > UINT32_C(0x40000000)) {
-        up = UINT32_C(0x80000000) - up;
+    *shortage = (uint16_t)(mulu16_q(u, 43691U) - mulu16_q(u2, 2185U) + mulu16_q(u3, 51U));
+    return (int32_t)(UINT32_C(0x40000000) - (square >> 3) + (((uint32_t)u2 * 2731U - (uint32_t)u3 * 91U) >> 2));
+}
+
+void sincos_q(uint32_t angle, int32_t *sine, int32_t *cosine)
+{
+    const uint8_t quarter = (uint8_t)((angle + UINT32_C(0x20000000)) >> 30);
+    const int32_t rest = (int32_t)(angle - ((uint32_t)quarter << 30)); /* +-45 deg */
+    const int32_t x = mul32_q(rest * 4, INT32_C(1686629713));          /* rad, Q30 */
+    uint16_t shortage;
+    const int32_t c = cosine_q((uint32_t)mul32_q(x, x) << 4, &shortage);
+    const int32_t s = shortened_q(x, shortage);
+
+    *sine = (quarter & 1U) != 0 ? c : s;
+    *cosine = (quarter & 1U) != 0 ? s : c;
+    if ((quarter & 2U) != 0) {
+        *sine = -*sine;
     }
-    if (up > UINT32_C(0x3FFFFFFF)) {
-        up = UINT32_C(0x3FFFFFFF);
+    if (quarter == 1U || quarter == 2U) {
+        *cosine = -*cosine;
     }
-    x = (uint16_t)(up >> 14); /* quarters of a turn, Q16 */
-    u = (uint16_t)(((uint32_t)x * x + x + 0x8000U) >> 16);
-    /* sin(x) / x - 1, Q16 */
-    p = (uint16_t)(5206U - mulu16_q(284, u));
-    p = (uint16_t)(42330U - mulu16_q(p, u));
-    p = (uint16_t)(37408U - mulu16_q(p, u));
-    sine = (int32_t)up + mul32u16_q((int32_t)up, p);
-    return (angle & UINT32_C(0x80000000)) != 0 ? -sine : sine;
 }
 
 void angles_q(const int32_t world_q_body[4], int16_t roll_pitch_yaw[3])
