@@ -1,7 +1,7 @@
 /* Holds the assembler products of fixed_avr.h against the C of fixed_q.h, on the target itself.
  *
  * Prints on UART 0 "products <calls> <differences>": every pair of a list of extremes, then pseudo-random operands.
- * On a machine without assembler both are one function, and the line says so by being the same.
+ * On a machine without assembler both are one function, and the line says so by being the same.  Needs core/fixed_q.c.
  */
 #include "../core/fixed_q.h"
 

@@ -10,7 +10,7 @@
 #define YAW 2
 #define QUARTER UINT32_C(0x40000000) /* 90 deg; 1, Q30 */
 #define STEEP INT32_C(0x03333333)    /* 0.05, Q30: the least cosine that is divided by */
-#define P_LIMIT UINT32_C(0xBFFFFFFF) /* 3, Q30 */
+#define P_LIMIT UINT32_C(0xBFFE0000) /* 3, Q30 */
 #define B_LIMIT UINT32_C(0x3FFFFFFF) /* 2^-10, Q40 */
 #define NO_GATE UINT32_C(0xFFFFFFFF)
 
@@ -46,16 +46,17 @@ static void rates(const struct tilt_q_state *s, const int32_t gyro[3], int32_t r
     sincos_q(s->channel[PITCH].angle, &sp, &cp);
     rate[PITCH] = mul32_q(gyro[1], cr) - mul32_q(gyro[2], sr);
     rate[YAW] = over_cosine(mul32_q(gyro[1], sr) + mul32_q(gyro[2], cr), cp > STEEP ? cp : STEEP);
-    rate[ROLL] = add_q((gyro[0] + (gyro[0] < 0x7FFFFFFE ? 2 : 0)) >> 2, 4 * clamp_q(mul32_q(rate[YAW], sp), 0x1FFFFFFF));
+    rate[ROLL] = add_q(((gyro[0] >> 1) + 1) >> 1, 4 * clamp_q(mul32_q(rate[YAW], sp), 0x1FFFFFFF));
 }
 
 /* One period: F = [1 -1; 0 1], the rate is `turn` of 2^-32 turns. */
 static void predict(struct tilt_q_channel *ch, const struct tilt_q_noise *noise, uint32_t turn)
 {
-    const int32_t change = (int32_t)(noise->angle + ((ch->b + 0x200U) >> 10)) - ((ch->c + 0x100) >> 9);
+    const uint32_t b = ch->b < B_LIMIT ? ch->b : B_LIMIT;
+    const int32_t change = (int32_t)(noise->angle + ((b + 0x200U) >> 10)) - (((ch->c >> 8) + 1) >> 1);
     const uint16_t below = (uint16_t)(ch->b_below + (uint16_t)noise->bias);
 
-    ch->angle += turn - (uint32_t)((ch->bias + 0x80) >> 8);
+    ch->angle += turn - (uint32_t)(((ch->bias >> 7) + 1) >> 1);
     if (change < 0) {
         ch->p = ch->p > (uint32_t)-change ? ch->p - (uint32_t)-change : 0;
     } else if (ch->p < P_LIMIT - (uint32_t)change) {
@@ -63,21 +64,18 @@ static void predict(struct tilt_q_channel *ch, const struct tilt_q_noise *noise,
     } else {
         ch->p = P_LIMIT;
     }
-    ch->c = add_q(ch->c, -(int32_t)(ch->b + (ch->b_below >> 15)) - noise->both);
-    ch->b += (noise->bias >> 16) + (below < ch->b_below ? 1U : 0U);
+    ch->c = add_q(ch->c, -(int32_t)(b + (ch->b_below >> 15)) - noise->both);
+    ch->b = b + (noise->bias >> 16) + (below < ch->b_below ? 1U : 0U);
     ch->b_below = below;
-    if (ch->b > B_LIMIT) {
-        ch->b = B_LIMIT;
-    }
 }
 
 /* 2^62 / x for 2^30 <= x: one step of Newton's on 16 bits; all ones for 2^30. */
 static uint32_t inverse(uint32_t x)
 {
-    const uint16_t first = divide_q(QUARTER, (uint16_t)(x >> 16)); /* Q16 */
+    const uint16_t first = divide_q(QUARTER, (uint16_t)((x + 0x8000U) >> 16)); /* Q16 */
     const int32_t off = INT32_C(0x20000000) - mul32u16_q((int32_t)(x >> 1), first); /* 1 - x first, Q29 */
 
-    return ((uint32_t)first << 16) + (uint32_t)(mul16u_q(narrow_q(off), first) / 8192);
+    return ((uint32_t)first << 16) + (uint32_t)(8 * high16_q(mul16u_q(narrow_q(off), first)));
 }
 
 /* By an angle; 0 if it is beyond the gate. */
@@ -118,7 +116,7 @@ static void fold(struct tilt_q_state *s)
 {
     if (s->channel[PITCH].angle + QUARTER > 2U * QUARTER) {
         s->channel[PITCH].angle = 2U * QUARTER - s->channel[PITCH].angle;
-        s->channel[PITCH].bias = -s->channel[PITCH].bias;
+        s->channel[PITCH].bias = minus_q(0, s->channel[PITCH].bias);
         s->channel[ROLL].angle += 2U * QUARTER;
         s->channel[YAW].angle += 2U * QUARTER;
     }
