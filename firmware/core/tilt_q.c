@@ -11,7 +11,7 @@
 #define QUARTER UINT32_C(0x40000000) /* 90 deg; 1, Q30 */
 #define STEEP INT32_C(0x03333333)    /* 0.05, Q30: the least cosine that is divided by */
 #define P_LIMIT UINT32_C(0xBFFE0000) /* 3, Q30 */
-#define B_LIMIT UINT32_C(0x3FFFFFFF) /* 2^-10, Q40 */
+#define B_LIMIT UINT32_C(0x3FFFFFFF) /* 1/4 of what 32 bits hold */
 #define NO_GATE UINT32_C(0xFFFFFFFF)
 
 /* x / cosine for cosine > 0, Q30, saturated: x (1 + d), so that d's rounding counts only as d does. */
@@ -53,7 +53,9 @@ static void rates(const struct tilt_q_state *s, const int32_t gyro[3], int32_t r
 static void predict(struct tilt_q_channel *ch, const struct tilt_q_noise *noise, uint32_t turn)
 {
     const uint32_t b = ch->b < B_LIMIT ? ch->b : B_LIMIT;
-    const int32_t change = (int32_t)(noise->angle + ((b + 0x200U) >> 10)) - (((ch->c >> 8) + 1) >> 1);
+    const uint8_t finer = noise->finer;
+    const int32_t change = (int32_t)(noise->angle + (((b >> (7U + finer)) + 1U) >> 1)) -
+                           (((ch->c >> (6U + finer)) + 1) >> 1);
     const uint16_t below = (uint16_t)(ch->b_below + (uint16_t)noise->bias);
 
     ch->angle += turn - (uint32_t)(((ch->bias >> 7) + 1) >> 1);
@@ -78,6 +80,39 @@ static uint32_t inverse(uint32_t x)
     return ((uint32_t)first << 16) + (uint32_t)(8 * high16_q(mul16u_q(narrow_q(off), first)));
 }
 
+/* b <- b - c (c g), not below 0. */
+static void take(struct tilt_q_channel *ch, int32_t c, uint8_t finer)
+{
+    uint32_t whole;
+    uint16_t below;
+
+    if (ch->c >= -0x7FFFFF && ch->c <= 0x7FFFFF) { /* so small that both may have 8 bits more */
+        whole = (uint32_t)mul32_q(ch->c * 256, c * 256) >> (6U + finer);
+        below = (uint16_t)whole;
+        whole >>= 16;
+    } else {
+        whole = (uint32_t)mul32_q(ch->c, c);
+        below = (uint16_t)(whole << (10U - finer));
+        whole >>= 6U + finer;
+    }
+    if (below > ch->b_below) {
+        whole++;
+    }
+    ch->b_below = ch->b >= whole ? (uint16_t)(ch->b_below - below) : 0;
+    ch->b = ch->b >= whole ? ch->b - whole : 0;
+}
+
+/* The new c times an innovation, 2^-32 turns, to Q8. */
+static int32_t learnt(int32_t c, int32_t innovation, uint8_t finer)
+{
+    const int32_t change = mul32_q(c, innovation);
+
+    if (finer > 2U) {
+        return ((change >> (finer - 3U)) + 1) >> 1;
+    }
+    return up_q(clamp_q(change, 0x1FFFFFFF), (uint8_t)(2U - finer));
+}
+
 /* By an angle; 0 if it is beyond the gate. */
 static uint8_t correct(struct tilt_q_channel *ch, const struct tilt_q_derived *d, const struct tilt_q_noise *noise,
                        uint32_t measured)
@@ -93,15 +128,10 @@ static uint8_t correct(struct tilt_q_channel *ch, const struct tilt_q_derived *d
         }
         const uint32_t rest = inverse(QUARTER + ch->p); /* 1 - gain, Q32 */
         const int32_t c = mul32_q(ch->c, (int32_t)(rest >> 1)) * 2;
-        const uint32_t less = (uint32_t)mul32_q(ch->c, c); /* Q48 */
-        const uint16_t below = (uint16_t)(ch->b_below - (uint16_t)(less << 8));
-        const uint32_t whole = (less >> 8) + (below > ch->b_below ? 1U : 0U);
-
         gain = 0U - rest;
-        ch->bias = clamp_q(add_q(ch->bias, mul32_q(c, innovation)), d->bias_limit);
+        ch->bias = clamp_q(add_q(ch->bias, learnt(c, innovation, noise->finer)), d->bias_limit);
+        take(ch, c, noise->finer);
         ch->c = c;
-        ch->b_below = ch->b >= whole ? below : 0;
-        ch->b = ch->b >= whole ? ch->b - whole : 0;
     } else {
         ch->c = 0;
         ch->known = 1;

@@ -11,12 +11,12 @@
  * Arithmetic.  Angles are binary, 2^32 = 360 deg, and wrap by themselves.  A bias is that of one period, and the
  * covariance is that of angle and bias a period, divided by R: then a period is predicted by sums alone, and a
  * correction, with g = 1 / (1 + p), is p <- 1 - g, c <- c g, b <- b - c (c g), the gains are p and c, and the one
- * division of a channel gives 32 bits of g.
+ * division of a channel gives 32 bits of g.  How small b and c are, the settings tell: `finer` places their points.
  * Error against double: tests/firmware/test_tilt_q.py.  Cost: firmware/budget.csv.
  *
  * What it does with bad input.
  * - Accelerometer all zero: predicted, not corrected; the variances grow until they saturate at 3 R, and
- *   (bias) at 2^-10 R a period.  Saturated: a wrong angle; beyond the gate it is refused.
+ *   of the bias at 2^-8 R / period^2 or less.  Saturated: a wrong angle; beyond the gate it is refused.
  * - Gyro stuck: its rate is a bias, drawn to at the pace that bias_walk says, and to bias_limit at most.
  * - 2 000 deg/s: Euler's step on the angles, as in the reference; rates of angles saturate at 512 rad/s.
  * - Dropped samples: `periods` says how many periods this sample stands for; each is predicted in turn.  Over more
@@ -45,18 +45,19 @@ struct tilt_q_settings {
     float tilt_sigma;    /* rad, of roll and pitch by the accelerometer */
     float heading_sigma; /* rad, of yaw by the magnetometer */
     float nis_gate;      /* 1, largest squared innovation over its variance; infinity: no gate */
-    float bias_sigma;    /* rad/s, of the biases before the first sample */
+    float bias_sigma;    /* rad/s, of the biases before the first sample; below 0.034 rate tilt_sigma */
     float bias_limit;    /* rad/s, at most 1.2 at 100 Hz; the double version has none */
 };
 
 /* Of one kind of measurement, everything divided by its variance R: an angle by gravity, or one by the field. */
 struct tilt_q_noise {
-    uint32_t angle;          /* added to p a period, 1, Q30 */
-    uint32_t bias;           /* added to b a period, per period^2, Q56 */
-    uint32_t first_bias;     /* b of an unknown bias, per period^2, Q40 */
-    uint32_t unknown_gain;   /* p / (1 + p) of an unknown angle, 1, Q32 */
-    uint32_t gate;           /* on the squared innovation over 1 + p, 2^16 of a turn, squared; all ones: none */
-    int32_t both;            /* taken off c a period, per period, Q40 */
+    uint32_t angle;        /* added to p a period, 1, Q30 */
+    uint32_t bias;         /* added to b a period, per period^2, Q(54 + finer) */
+    uint32_t first_bias;   /* b of an unknown bias, per period^2, Q(38 + finer) */
+    uint32_t unknown_gain; /* p / (1 + p) of an unknown angle, 1, Q32 */
+    uint32_t gate;         /* on the squared innovation over 1 + p, 2^16 of a turn, squared; all ones: none */
+    int32_t both;          /* taken off c a period, per period, Q(38 + finer) */
+    uint8_t finer;         /* bits, 0 to 6: as many as leave room for b and c after the start */
 };
 
 /* What the settings are at one rate. */
@@ -72,9 +73,9 @@ struct tilt_q_channel {
     uint32_t angle;     /* 2^32 = 360 deg */
     int32_t bias;       /* of its rate, 2^-32 turns a period, Q8 */
     uint32_t p;         /* variance of the angle over R, 1, Q30 */
-    int32_t c;          /* covariance of angle and bias over R, per period, Q40 */
-    uint32_t b;         /* variance of the bias over R, per period^2, Q40 ... */
-    uint16_t b_below;   /* ... and what it has below, Q56 */
+    int32_t c;          /* covariance of angle and bias over R, per period, Q(38 + finer) */
+    uint32_t b;         /* variance of the bias over R, per period^2, Q(38 + finer) ... */
+    uint16_t b_below;   /* ... and what it has below, Q(54 + finer) */
     uint8_t known;      /* 0: the variance of the angle is that of no knowledge */
 };
 

@@ -36,10 +36,18 @@ static void derive_noise(const struct tilt_q_settings *settings, float sigma, fl
     const float first = settings->bias_sigma * settings->bias_sigma / (rate * rate) * relative;
     const float gate = settings->nis_gate * sigma * sigma / (TURN * TURN);
 
+    /* |c| reaches 0.7 b^(2/3) after the start; it has room up to 2^-(7 + finer), b up to 2^-(8 + finer) */
+    float room = first * first * 2097152.0F;
+    uint8_t finer = 0;
+    while (finer < 6U && room < 0.125F) {
+        room *= 8.0F;
+        finer++;
+    }
+    noise->finer = finer;
     noise->angle = fixed(angle + bias / 3.0F, 30, 0x1FFFFFFFUL);
-    noise->bias = fixed(bias, 56, 0xFFFFFFFFUL);
-    noise->both = (int32_t)fixed(0.5F * bias, 40, 0x1FFFFFFFUL);
-    noise->first_bias = fixed(first, 40, 0x3FFFFFFFUL);
+    noise->bias = fixed(bias, (uint8_t)(54U + finer), 0xFFFFFFFFUL);
+    noise->both = (int32_t)fixed(0.5F * bias, (uint8_t)(38U + finer), 0x1FFFFFFFUL);
+    noise->first_bias = fixed(first, (uint8_t)(38U + finer), 0x3FFFFFFFUL);
     noise->unknown_gain = fixed(UNKNOWN / (UNKNOWN + sigma * sigma), 32, 0xFFFFFF00UL);
     noise->gate = gate < 0.125F ? fixed(gate, 32, 0x1FFFFFFFUL) : 0xFFFFFFFFUL;
 }
