@@ -11,6 +11,7 @@
 
 typedef char settings_are_floats[sizeof(struct error_state_f32_settings) == SETTINGS * sizeof(float) ? 1 : -1];
 
+SELDOM_F32
 void error_state_f32_defaults(struct error_state_f32_settings *settings)
 {
     static const struct error_state_f32_settings usual = {
@@ -57,8 +58,9 @@ void error_state_f32_defaults(struct error_state_f32_settings *settings)
     *settings = usual;
 }
 
-SELDOM_F32 void error_state_f32_derive(const struct error_state_f32_settings *settings,
-                                       struct error_state_f32_derived *derived)
+SELDOM_F32
+void error_state_f32_derive(const struct error_state_f32_settings *settings,
+                            struct error_state_f32_derived *derived)
 {
     float values[SETTINGS];
     int i;
@@ -75,21 +77,9 @@ SELDOM_F32 void error_state_f32_derive(const struct error_state_f32_settings *se
     derived->bias_memory *= 2.0f;
 }
 
-SELDOM_F32 void error_state_f32_half_angle(float x, float y, float half[2])
-{
-    const float length = sqrtf(x * x + y * y);
-    float c = length + x, d = y, scale;
-    if (x < 0.0f) { /* the sum above loses digits */
-        c = y < 0.0f ? -y : y;
-        d = y < 0.0f ? x - length : length - x;
-    }
-    scale = sqrtf(c * c + d * d);
-    half[0] = scale > 0.0f ? c / scale : 1.0f;
-    half[1] = scale > 0.0f ? d / scale : 0.0f;
-}
-
 /* The attitude of yaw 0 in which the specific force points up. */
-SELDOM_F32 static void level(float turn[4], const float accel[3])
+SELDOM_F32
+static void level(float turn[4], const float accel[3])
 {
     float roll[2], pitch[2];
     error_state_f32_half_angle(accel[2], accel[1], roll);
@@ -100,6 +90,7 @@ SELDOM_F32 static void level(float turn[4], const float accel[3])
     turn[3] = -roll[1] * pitch[1];
 }
 
+SELDOM_F32
 static void open_block(struct error_state_f32_state *s)
 {
     memset(&s->sums, 0, sizeof s->sums);
@@ -107,8 +98,9 @@ static void open_block(struct error_state_f32_state *s)
     s->closing = 0;
 }
 
-SELDOM_F32 void error_state_f32_start(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
-                                      const struct imu_f32 *first)
+SELDOM_F32
+void error_state_f32_start(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
+                           const struct imu_f32 *first)
 {
     memset(s, 0, sizeof *s);
     s->started = (uint8_t)error_state_f32_force_usable(first->accel);
@@ -127,9 +119,10 @@ SELDOM_F32 void error_state_f32_start(struct error_state_f32_state *s, const str
 }
 
 /* The rest of what a block corrects, with the next sample: so that none of both takes too long. */
+SELDOM_F32
 static void finish_block(struct error_state_f32_state *s, const struct error_state_f32_derived *d)
 {
-    if (s->resting && s->sums.elapsed > 0.0f) {
+    if (s->resting) {
         error_state_f32_rest_bias(s, d);
     }
     if (s->sums.fields > 0) {
@@ -139,6 +132,7 @@ static void finish_block(struct error_state_f32_state *s, const struct error_sta
 }
 
 /* Predict with the sums of a block and correct the inclination. */
+SELDOM_F32
 static void close_block(struct error_state_f32_state *s, const struct error_state_f32_derived *d)
 {
     const float per_force = s->sums.forces > 0 ? 1.0f / (float)s->sums.forces : 1.0f;
@@ -160,8 +154,9 @@ static void close_block(struct error_state_f32_state *s, const struct error_stat
 }
 
 /* Nothing was read for a while: it may have turned by half a radian a second, any way. */
-SELDOM_F32 static void jump(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
-                            const float accel[3], float dt)
+SELDOM_F32
+static void jump(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
+                 const float accel[3], float dt)
 {
     const float turned = smaller_f32(0.25f * dt * dt, 10.0f);
     if (s->sums.samples > 0) {
@@ -174,8 +169,10 @@ SELDOM_F32 static void jump(struct error_state_f32_state *s, const struct error_
     s->age = 0.0f;
     error_state_f32_widen_tilt(s, d, smaller_f32(turned, d->tilt_prior), turned);
     if (turned > d->tilt_prior && error_state_f32_force_usable(accel)) {
-        const struct rotation_f32 r = rotation_f32(load_quaternion_f32(s->turn));
-        error_state_f32_lean_upright(s->turn, rotated_f32(&r, load_vector_f32(accel)));
+        float matrix[9], force[3] = {0.0f, 0.0f, 0.0f};
+        error_state_f32_rotation(s->turn, matrix);
+        error_state_f32_add_turned(force, matrix, accel);
+        error_state_f32_lean_upright(s->turn, force);
     }
     s->level = d->level_prior;
     s->still = 0.0f;
@@ -186,13 +183,12 @@ SELDOM_F32 static void jump(struct error_state_f32_state *s, const struct error_
 void error_state_f32_step(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                           const struct imu_f32 *sample, float dt)
 {
-    const uint32_t fastest = bound_f32(FASTEST);
-    const float *w = sample->gyro;
+    const struct vector_f32 rate = load_vector_f32(sample->gyro);
     float since = (dt > 0.0f ? dt : 0.0f) + s->pending;
     if (s->closing) {
         finish_block(s, d);
     }
-    s->unread = !(below_f32(w[0], fastest) && below_f32(w[1], fastest) && below_f32(w[2], fastest));
+    s->unread = !(dot_f32(rate, rate) < FASTEST * FASTEST);
     if (s->unread) {
         s->pending = smaller_f32(since, LONGEST_PAUSE);
         return;

@@ -7,21 +7,15 @@
 #define FIELD_SPAN UINT32_C(0x3C000000)   /* bits of 2^60, less those */
 
 /* Whether a vector is a reading; no for NaN, infinity and zero. */
-INLINE_F32 int reads(struct vector_f32 v, uint32_t span)
+ONCE_F32
+static int reads(const float v[3], uint32_t span)
 {
-    return bits_f32(dot_f32(v, v)) - LEAST_SQUARE < span;
+    return bits_f32(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - LEAST_SQUARE < span;
 }
 
 int error_state_f32_force_usable(const float force[3])
 {
-    return reads(load_vector_f32(force), FORCE_SPAN);
-}
-
-INLINE_F32 void add(float sum[3], struct vector_f32 v)
-{
-    sum[0] += v.x;
-    sum[1] += v.y;
-    sum[2] += v.z;
+    return reads(force, FORCE_SPAN);
 }
 
 /* Whether a reading is new, which is kept then: one that is bit for bit the one before is a held one. */
@@ -38,38 +32,51 @@ INLINE_F32 int is_news(float last[3], const float field[3])
 }
 
 /* Turn half way between two readings: the rate of sampling does not shift the attitude in time. */
-INLINE_F32 struct quaternion_f32 turn(struct error_state_f32_state *restrict s, const float gyro[3], float dt)
+INLINE_F32 void integrate(struct error_state_f32_state *restrict s, const float rate[3], float dt)
 {
-    const struct vector_f32 rate = load_vector_f32(gyro), bias = load_vector_f32(s->tilt + 3);
-    const struct vector_f32 now = minus_f32(rate, bias, 1.0f);
-    const struct vector_f32 before = minus_f32(load_vector_f32(s->last_rate), bias, 1.0f);
-    const struct vector_f32 r = scaled_f32(plus_f32(now, before, 1.0f), 0.5f * dt);
-    store_vector_f32(s->last_rate, rate);
-    add(s->sums.rate, rate);
-    s->sums.rate_squared += dot_f32(now, now);
-    return turned_f32(load_quaternion_f32(s->turn), scaled_f32(r, 0.5f + (0.5f / 12.0f) * dot_f32(r, r)));
+    float by[4], rate_squared = 0.0f, squared = 0.0f, scale;
+    int i;
+    for (i = 0; i < 3; i++) {
+        const float bias = s->tilt[3 + i], now = rate[i] - bias;
+        by[1 + i] = 0.5f * dt * (now + (s->last_rate[i] - bias));
+        rate_squared += now * now;
+        squared += by[1 + i] * by[1 + i];
+        s->last_rate[i] = rate[i];
+        s->sums.rate[i] += rate[i];
+    }
+    s->sums.rate_squared += rate_squared;
+    scale = 0.5f + (0.5f / 12.0f) * squared;
+    by[0] = 1.0f;
+    by[1] *= scale;
+    by[2] *= scale;
+    by[3] *= scale;
+    error_state_f32_multiply(s->turn, by, s->turn);
+    error_state_f32_normalise(s->turn, 4);
 }
 
+SELDOM_F32
 void error_state_f32_gather(struct error_state_f32_state *restrict s, const struct imu_f32 *restrict sample,
                             float dt)
 {
     struct error_state_f32_sums *sums = &s->sums;
-    const struct quaternion_f32 q = turn(s, sample->gyro, dt);
-    const struct rotation_f32 r = rotation_f32(q);
-    const struct vector_f32 accel = load_vector_f32(sample->accel), mag = load_vector_f32(sample->mag);
-    store_quaternion_f32(s->turn, q);
-    add(sums->turned, r.x);
-    add(sums->turned + 3, r.y);
-    add(sums->turned + 6, r.z);
+    float matrix[9];
+    int i;
+    integrate(s, sample->gyro, dt);
+    error_state_f32_rotation(s->turn, matrix);
+    for (i = 0; i < 9; i++) {
+        sums->turned[i] += matrix[i];
+    }
     sums->samples++;
     sums->elapsed += dt;
-    if (reads(accel, FORCE_SPAN)) {
-        add(sums->force, rotated_f32(&r, accel));
-        add(sums->specific, accel);
+    if (reads(sample->accel, FORCE_SPAN)) {
+        error_state_f32_add_turned(sums->force, matrix, sample->accel);
+        for (i = 0; i < 3; i++) {
+            sums->specific[i] += sample->accel[i];
+        }
         sums->forces++;
     }
-    if (reads(mag, FIELD_SPAN) && is_news(s->last_field, sample->mag)) {
-        add(sums->field, rotated_f32(&r, mag));
+    if (reads(sample->mag, FIELD_SPAN) && is_news(s->last_field, sample->mag)) {
+        error_state_f32_add_turned(sums->field, matrix, sample->mag);
         sums->fields++;
     }
 }

@@ -5,36 +5,43 @@
  */
 #include "error_state_parts_f32.h"
 
-#define LEAST_HEADING 1e-12f   /* rad^2, 1 and s^2: below this a variance is rounding */
-#define LONGEST_UNSEEN 0.5f    /* s: disturbances farther apart than this are independent */
+#define LONGEST_UNSEEN 0.5f  /* s: disturbances farther apart than this are independent */
 #define UNKNOWN_HEADING 1.0f /* rad^2: beyond this a heading is begun anew */
 
 /* Add an angle to the heading: half of it by its tangent, whose series ends with the fifth power. */
+SELDOM_F32
 static void turn_heading(float half[2], float angle)
 {
-    const float a = 0.5f * angle, squared = a * a;
+    const float a = 0.5f * angle, squared = a * a, c = half[0], d = half[1];
     const float tangent = a * (1.0f + squared * (1.0f / 3.0f + squared * (2.0f / 15.0f)));
-    const float c = half[0] - tangent * half[1], d = half[1] + tangent * half[0];
-    const float scale = 1.0f / sqrtf(c * c + d * d);
-    half[0] = c * scale;
-    half[1] = d * scale;
+    half[0] = c - tangent * d;
+    half[1] = d + tangent * c;
+    error_state_f32_normalise(half, 2);
+}
+
+/* Make the hard iron less sure. */
+ONCE_F32 SELDOM_F32
+static void add_iron(float *p, float variance)
+{
+    p[LOWER(3, 3)] += variance;
+    p[LOWER(4, 4)] += variance;
+    p[LOWER(5, 5)] += variance;
 }
 
 /* Take the heading, and as long as the inclination is unsure the reference too, from a field. */
-SELDOM_F32 static void begin_heading(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
-                                     const float field[3], float tilt)
+SELDOM_F32
+static void begin_heading(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
+                          const float field[3], float tilt)
 {
     const float across = field[0] * field[0] + field[1] * field[1], up = field[2] * field[2];
     float *p = s->heading_cov;
     int i;
     if (!s->heading_known) {
         s->per_length = 1.0f / sqrtf(across + up);
-        memset(p, 0, sizeof s->heading_cov);
-        memset(s->heading, 0, sizeof s->heading);
+        error_state_f32_fill(p, LOWER(7, 0), 0.0f);
+        error_state_f32_fill(s->heading, 6, 0.0f);
         s->heading[6] = d->delay;
-        p[LOWER(3, 3)] = d->iron_prior;
-        p[LOWER(4, 4)] = d->iron_prior;
-        p[LOWER(5, 5)] = d->iron_prior;
+        add_iron(p, d->iron_prior);
         p[LOWER(6, 6)] = d->delay_prior;
     }
     if (!s->heading_known || tilt > d->tilt_known) {
@@ -53,32 +60,37 @@ SELDOM_F32 static void begin_heading(struct error_state_f32_state *s, const stru
 }
 
 /* Random walk of the heading by `variance`, of the reference and of the iron by their settings. */
+SELDOM_F32
 void error_state_f32_drift_heading(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                                    float variance)
 {
     const float dt = s->sums.elapsed;
-    float *diagonal = s->heading_cov;
-    int i;
-    for (i = 0; i < 7; i++) {
-        const float walk = i < 3 ? d->reference_walk : (i < 6 ? d->iron_walk : 0.0f);
-        *diagonal = larger_f32(*diagonal, LEAST_HEADING) + (i == 0 ? variance : walk * dt);
-        diagonal += i + 2;
-    }
+    float *p = s->heading_cov;
+    p[0] += variance;
+    p[LOWER(1, 1)] += d->reference_walk * dt;
+    p[LOWER(2, 2)] += d->reference_walk * dt;
+    add_iron(p, d->iron_walk * dt);
     s->unseen = smaller_f32(s->unseen + dt, LONGEST_UNSEEN);
 }
 
 /* Twice the vector part of end * begin^-1 over dt: the mean rate of the block in the frame of the gyro. */
+SELDOM_F32
 static struct vector_f32 mean_rate(const struct error_state_f32_state *s)
 {
-    const struct quaternion_f32 q = load_quaternion_f32(s->turn), p = load_quaternion_f32(s->begin);
-    const float per_second = 2.0f / s->sums.elapsed;
-    const float scale = q.w * p.w + q.x * p.x + q.y * p.y + q.z * p.z >= 0.0f ? per_second : -per_second;
-    return vector_f32(scale * (q.x * p.w - q.w * p.x - q.y * p.z + q.z * p.y),
-                      scale * (q.y * p.w - q.w * p.y + q.x * p.z - q.z * p.x),
-                      scale * (q.z * p.w - q.w * p.z - q.x * p.y + q.y * p.x));
+    float by[4], scale = 2.0f / s->sums.elapsed;
+    by[0] = s->begin[0];
+    by[1] = -s->begin[1];
+    by[2] = -s->begin[2];
+    by[3] = -s->begin[3];
+    error_state_f32_multiply(s->turn, by, by);
+    if (by[0] < 0.0f) {
+        scale = -scale;
+    }
+    return scaled_f32(load_vector_f32(by + 1), scale);
 }
 
 /* East, north and up of the mean field by the heading, and how they depend on the errors. */
+SELDOM_F32
 static void look(const struct error_state_f32_state *s, const float field[3],
                  struct error_state_f32_reading readings[3], float found[3])
 {
@@ -108,44 +120,52 @@ static void look(const struct error_state_f32_state *s, const float field[3],
 
 /* By how much the square of the error of strength and dip is beyond what is expected; the heading does not
  * matter for it: a wrong heading must not make the field look disturbed. */
+SELDOM_F32
 static float beyond(const struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                     const struct error_state_f32_reading readings[3], const float found[3], float tilt)
 {
     const float north = s->heading[1], *p = s->heading_cov;
-    const float x = found[0] - error_state_f32_along(&readings[0], s->heading);
-    const float y = found[1] - error_state_f32_along(&readings[1], s->heading) + north;
-    const float up = found[2] - error_state_f32_along(&readings[2], s->heading);
-    const float across = sqrtf(x * x + y * y) - north;
-    return larger_f32(0.0f, across * across + up * up - p[LOWER(1, 1)] - p[LOWER(2, 2)] - tilt - d->field_gate);
+    float off[3], across;
+    int i;
+    for (i = 0; i < 3; i++) {
+        off[i] = found[i] - error_state_f32_along(&readings[i], s->heading);
+    }
+    off[1] += north;
+    across = sqrtf(off[0] * off[0] + off[1] * off[1]) - north;
+    return larger_f32(0.0f, across * across + off[2] * off[2] - p[LOWER(1, 1)] - p[LOWER(2, 2)] - tilt - d->field_gate);
 }
 
+SELDOM_F32
 static void correct_heading(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                             const float field[3], float tilt)
 {
     struct error_state_f32_reading readings[3];
     float found[3], excess, noise, *p = s->heading_cov;
+    int i;
     look(s, field, readings, found);
     excess = beyond(s, d, readings, found, tilt);
     noise = d->field_noise / larger_f32(s->unseen, d->block) + 0.5f * tilt + d->field_doubt * excess;
     s->disturbed = excess > 0.0f;
-    excess *= d->iron_doubt * s->unseen;
-    p[LOWER(3, 3)] += excess;
-    p[LOWER(4, 4)] += excess;
-    p[LOWER(5, 5)] += excess;
-    error_state_f32_read_three(s->heading, p, 7, readings, found, noise);
+    add_iron(p, excess * d->iron_doubt * s->unseen);
+    for (i = 0; i < 3; i++) {
+        error_state_f32_read(s->heading, p, 7, &readings[i], found[i], noise);
+    }
     turn_heading(s->half, s->heading[0]);
     s->heading[0] = 0.0f;
     s->unseen = 0.0f;
 }
 
 /* Whether the heading has to be begun with the next field: not known, or known less than the inclination. */
-int error_state_f32_heading_unsure(const struct error_state_f32_state *s, const struct error_state_f32_derived *d)
+SELDOM_F32
+int error_state_f32_heading_unsure(const struct error_state_f32_state *s,
+                                   const struct error_state_f32_derived *d)
 {
     return !s->heading_known || s->heading_cov[0] > UNKNOWN_HEADING ||
            s->tilt_cov[LOWER(0, 0)] + s->tilt_cov[LOWER(1, 1)] > d->tilt_known;
 }
 
 /* Correct the heading by the mean field of a block, or begin with it where the heading is unsure. */
+SELDOM_F32
 void error_state_f32_use_field(struct error_state_f32_state *s, const struct error_state_f32_derived *d)
 {
     const float tilt = s->tilt_cov[LOWER(0, 0)] + s->tilt_cov[LOWER(1, 1)];

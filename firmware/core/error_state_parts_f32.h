@@ -14,9 +14,9 @@
 extern "C" {
 #endif
 
-/* What hardly ever runs is made small, what runs in several places is made once. */
+/* What does not run at every sample is made small, what runs in several places is made once. */
 #if defined(__GNUC__)
-#define SELDOM_F32 __attribute__((cold, noinline))
+#define SELDOM_F32 __attribute__((cold))
 #define ONCE_F32 __attribute__((noinline))
 #else
 #define SELDOM_F32
@@ -36,46 +36,30 @@ INLINE_F32 float smaller_f32(float a, float b)
     return a < b ? a : b;
 }
 
-/* Rows of a rotation matrix. */
-struct rotation_f32 {
-    struct vector_f32 x, y, z; /* 1 */
-};
-
-INLINE_F32 struct rotation_f32 rotation_f32(struct quaternion_f32 q)
-{
-    const float w2 = 2.0f * q.w, x2 = 2.0f * q.x, y2 = 2.0f * q.y, z2 = 2.0f * q.z;
-    const float xx = x2 * q.x, yy = y2 * q.y, zz = z2 * q.z, xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
-    const float wx = w2 * q.x, wy = w2 * q.y, wz = w2 * q.z;
-    struct rotation_f32 r;
-    r.x = vector_f32(1.0f - (yy + zz), xy - wz, xz + wy);
-    r.y = vector_f32(xy + wz, 1.0f - (xx + zz), yz - wx);
-    r.z = vector_f32(xz - wy, yz + wx, 1.0f - (xx + yy));
-    return r;
-}
-
-INLINE_F32 struct vector_f32 rotated_f32(const struct rotation_f32 *r, struct vector_f32 v)
-{
-    return vector_f32(dot_f32(r->x, v), dot_f32(r->y, v), dot_f32(r->z, v));
-}
-
-/* A scalar reading of up to 5 of up to 10 errors, z = H x. */
+/* A scalar reading of up to 5 of up to 10 errors, z = H x; or what moves one error by others. */
 struct error_state_f32_reading {
     float weight[5];  /* the reading's unit over the error's: what is not zero in H */
     float gain[10];   /* the error's unit times the reading's: P H' */
-    float inverse;    /* 1 over the reading's unit squared: 1 / (H P H' + noise) */
     uint8_t error[5]; /* which errors */
     uint8_t terms;    /* 1, how many */
 };
 
-/* reading: H times values; read puts the correction into the values (and gives the innovation), with P as before
- * another reading whose share is left out; take then takes what one or two readings know from P. */
+/* reading: H times values; read corrects values and covariance and gives the innovation; move adds H x to error
+ * k in the covariance and gives H P H'. */
 float error_state_f32_along(const struct error_state_f32_reading *reading, const float *values);
-float error_state_f32_read(float *values, const float *cov, int n, struct error_state_f32_reading *reading,
-                           const struct error_state_f32_reading *before, float found, float noise);
-void error_state_f32_take(float *cov, int n, const struct error_state_f32_reading *first,
-                          const struct error_state_f32_reading *second);
-void error_state_f32_read_three(float *values, float *cov, int n, struct error_state_f32_reading readings[3],
-                                const float found[3], float noise);
+float error_state_f32_read(float *values, float *cov, int n, struct error_state_f32_reading *reading,
+                           float found, float noise);
+float error_state_f32_move(float *cov, int n, int k, struct error_state_f32_reading *by);
+
+/* turning: out = p q, which may be one of both; to length 1; all to one value; rotation matrix, row by row; sum += m v; by the
+ * quaternion (c, x, y, 0) in the frame of the gyro, normalised. */
+void error_state_f32_multiply(const float p[4], const float q[4], float out[4]);
+void error_state_f32_normalise(float *values, int n);
+void error_state_f32_fill(float *values, int n, float value);
+void error_state_f32_rotation(const float turn[4], float matrix[9]);
+void error_state_f32_add_turned(float sum[3], const float m[9], const float v[3]);
+void error_state_f32_lean(float turn[4], float c, float x, float y);
+void error_state_f32_lean_upright(float turn[4], const float force[3]);
 
 /* start: level by the accelerometer; cosine and sine of half of the angle of (x, y). */
 void error_state_f32_half_angle(float x, float y, float half[2]);
@@ -99,7 +83,6 @@ void error_state_f32_watch_rest(struct error_state_f32_state *s, const struct er
                                 float per_force);
 int error_state_f32_overturned(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                                float per_force);
-void error_state_f32_lean_upright(float turn[4], struct vector_f32 force);
 
 /* heading: drift over a block, and the correction by the mean field. */
 void error_state_f32_drift_heading(struct error_state_f32_state *s, const struct error_state_f32_derived *d,

@@ -1,7 +1,7 @@
 /* Scalar readings of errors whose covariance is kept as its lower triangle, row by row. */
 #include "error_state_parts_f32.h"
 
-#define TAKE(j) row[j] -= gain_a * a##j + gain_b * b##j
+#define LEAST_VARIANCE 1e-12f /* of rad, rad/s, m, m/s, s or 1, squared: what is less is rounding */
 
 float error_state_f32_along(const struct error_state_f32_reading *reading, const float *values)
 {
@@ -27,78 +27,50 @@ static void add_column(float *to, const float *cov, int n, int k, float weight)
     }
 }
 
-float error_state_f32_read(float *values, const float *cov, int n, struct error_state_f32_reading *reading,
-                           const struct error_state_f32_reading *before, float found, float noise)
+/* P H' */
+ONCE_F32
+static void project(const float *cov, int n, struct error_state_f32_reading *reading)
 {
-    const float innovation = found - error_state_f32_along(reading, values);
-    float *g = reading->gain, step;
     int i;
-    memset(g, 0, sizeof reading->gain);
+    error_state_f32_fill(reading->gain, n, 0.0f);
     for (i = 0; i < reading->terms; i++) {
-        add_column(g, cov, n, reading->error[i], reading->weight[i]);
+        add_column(reading->gain, cov, n, reading->error[i], reading->weight[i]);
     }
-    if (before) { /* what both have in common is known */
-        const float share = before->inverse * error_state_f32_along(reading, before->gain);
-        for (i = 0; i < n; i++) {
-            g[i] -= share * before->gain[i];
-        }
+}
+
+SELDOM_F32
+float error_state_f32_move(float *cov, int n, int k, struct error_state_f32_reading *by)
+{
+    float *row = cov + LOWER(k, 0), *g = by->gain, added;
+    int i;
+    project(cov, n, by);
+    added = error_state_f32_along(by, g);
+    g[k] = 2.0f * g[k] + added;
+    for (i = 0; i < k; i++) {
+        *row++ += *g++;
     }
-    reading->inverse = 1.0f / (larger_f32(error_state_f32_along(reading, g), 0.0f) + noise);
-    step = innovation * reading->inverse;
+    for (i = k + 1; i <= n; i++) {
+        *row += *g++;
+        row += i;
+    }
+    return added;
+}
+
+float error_state_f32_read(float *values, float *cov, int n, struct error_state_f32_reading *reading,
+                           float found, float noise)
+{
+    const float innovation = found - error_state_f32_along(reading, values), *g = reading->gain;
+    float inverse;
+    int i, j;
+    project(cov, n, reading);
+    inverse = 1.0f / (larger_f32(error_state_f32_along(reading, g), 0.0f) + noise);
     for (i = 0; i < n; i++) {
-        values[i] += step * g[i];
+        const float gain = inverse * g[i];
+        values[i] += gain * innovation;
+        for (j = 0; j <= i; j++) {
+            *cov++ -= gain * g[j];
+        }
+        cov[-1] = larger_f32(cov[-1], LEAST_VARIANCE);
     }
     return innovation;
-}
-
-/* P <- P - a a' / A - b b' / B.  A third of a block's time is spent here: a row's products are straight-line
- * code that is entered at the row's length. */
-void error_state_f32_take(float *cov, int n, const struct error_state_f32_reading *first,
-                          const struct error_state_f32_reading *second)
-{
-    const float *a = first->gain, *b = second ? second->gain : a;
-    const float per_a = first->inverse, per_b = second ? second->inverse : 0.0f;
-    const float a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3], a4 = a[4];
-    const float a5 = a[5], a6 = a[6], a7 = a[7], a8 = a[8], a9 = a[9];
-    const float b0 = b[0], b1 = b[1], b2 = b[2], b3 = b[3], b4 = b[4];
-    const float b5 = b[5], b6 = b[6], b7 = b[7], b8 = b[8], b9 = b[9];
-    float *row = cov;
-    int i = 0;
-    do {
-        const float gain_a = per_a * *a++, gain_b = per_b * *b++;
-        switch (i) {
-        default:
-            TAKE(9); /* fall through */
-        case 8:
-            TAKE(8); /* fall through */
-        case 7:
-            TAKE(7); /* fall through */
-        case 6:
-            TAKE(6); /* fall through */
-        case 5:
-            TAKE(5); /* fall through */
-        case 4:
-            TAKE(4); /* fall through */
-        case 3:
-            TAKE(3); /* fall through */
-        case 2:
-            TAKE(2); /* fall through */
-        case 1:
-            TAKE(1); /* fall through */
-        case 0:
-            TAKE(0);
-        }
-        i++;
-        row += i;
-    } while (i < n);
-}
-
-void error_state_f32_read_three(float *values, float *cov, int n, struct error_state_f32_reading readings[3],
-                                const float found[3], float noise)
-{
-    error_state_f32_read(values, cov, n, &readings[0], 0, found[0], noise);
-    error_state_f32_read(values, cov, n, &readings[1], &readings[0], found[1], noise);
-    error_state_f32_take(cov, n, &readings[0], &readings[1]);
-    error_state_f32_read(values, cov, n, &readings[2], 0, found[2], noise);
-    error_state_f32_take(cov, n, &readings[2], 0);
 }

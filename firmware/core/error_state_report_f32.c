@@ -10,15 +10,23 @@ INLINE_F32 struct vector_f32 present_rate(const struct error_state_f32_state *s)
 
 /* The attitude of the gyro's frame at the time of the sample, whose reading is `latency` old, turned about the
  * vertical by the angle of which cosine and sine of the half are given; the one of both signs with w >= 0. */
-ONCE_F32 static void ahead(const struct error_state_f32_state *s, float e, float f, float out[4])
+ONCE_F32
+static void ahead(const struct error_state_f32_state *s, float c, float d, float out[4])
 {
-    const struct quaternion_f32 q =
-        turned_f32(load_quaternion_f32(s->turn), scaled_f32(present_rate(s), 0.5f * s->latency));
-    const float w = e * q.w - f * q.z, sign = w < 0.0f ? -1.0f : 1.0f;
-    out[0] = sign * w;
-    out[1] = sign * (e * q.x - f * q.y);
-    out[2] = sign * (e * q.y + f * q.x);
-    out[3] = sign * (e * q.z + f * q.w);
+    float by[4], about[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    int i;
+    about[0] = c;
+    about[3] = d;
+    by[0] = 1.0f;
+    store_vector_f32(by + 1, scaled_f32(present_rate(s), 0.5f * s->latency));
+    error_state_f32_multiply(s->turn, by, by);
+    error_state_f32_multiply(about, by, out);
+    error_state_f32_normalise(out, 4);
+    if (out[0] < 0.0f) {
+        for (i = 0; i < 4; i++) {
+            out[i] = -out[i];
+        }
+    }
 }
 
 void error_state_f32_heading_free(const struct error_state_f32_state *s, float frame_q_body[4])
@@ -35,13 +43,11 @@ void error_state_f32_attitude(const struct error_state_f32_state *s, float world
 static void into_body(const struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                       const float frame[6], float cov[9])
 {
-    const struct rotation_f32 rotation = rotation_f32(load_quaternion_f32(s->turn));
-    float rate[3], x[3], y[3], z[3];
+    float matrix[9], rate[3];
+    const float *x = matrix, *y = matrix + 3, *z = matrix + 6;
     int i, j;
+    error_state_f32_rotation(s->turn, matrix);
     store_vector_f32(rate, present_rate(s));
-    store_vector_f32(x, rotation.x);
-    store_vector_f32(y, rotation.y);
-    store_vector_f32(z, rotation.z);
     for (j = 0; j < 3; j++) {
         const float u = frame[0] * x[j] + frame[1] * y[j] + frame[3] * z[j];
         const float v = frame[1] * x[j] + frame[2] * y[j] + frame[4] * z[j];

@@ -4,7 +4,8 @@
 #define SETTLED 1.0f /* s over which the mean force shows roughly where up is */
 
 /* Draw a low-passed vector to a mean; the square of what it was off by. */
-ONCE_F32 static float follow(float slow[3], const float sum[3], float per_sample, float share)
+ONCE_F32 SELDOM_F32
+static float follow(float slow[3], const float sum[3], float per_sample, float share)
 {
     float squared = 0.0f;
     int i;
@@ -17,6 +18,7 @@ ONCE_F32 static float follow(float slow[3], const float sum[3], float per_sample
 }
 
 /* At rest: mean rate and force of blocks stay near their low-passed values for `rest_time`. */
+SELDOM_F32
 void error_state_f32_watch_rest(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                                 float per_force)
 {
@@ -35,25 +37,8 @@ void error_state_f32_watch_rest(struct error_state_f32_state *s, const struct er
     s->resting = s->still >= d->rest_time;
 }
 
-/* Turn by the shortest way such that a force in the frame of the gyro points up. */
-SELDOM_F32 void error_state_f32_lean_upright(float turn[4], struct vector_f32 force)
-{
-    const struct quaternion_f32 q = load_quaternion_f32(turn);
-    const float sum = sqrtf(dot_f32(force, force)) + force.z;
-    const float length = sqrtf(sum * sum + force.x * force.x + force.y * force.y);
-    float c = 0.0f, u = 1.0f, v = 0.0f; /* straight down: over any axis */
-    if (length >= 1e-9f) {
-        c = sum / length;
-        u = force.y / length;
-        v = -force.x / length;
-    }
-    turn[0] = c * q.w - u * q.x - v * q.y;
-    turn[1] = c * q.x + u * q.w + v * q.z;
-    turn[2] = c * q.y + v * q.w - u * q.z;
-    turn[3] = c * q.z + u * q.y - v * q.x;
-}
-
 /* Whether the force of the last while points far from up: then level by it, and begin again. */
+SELDOM_F32
 int error_state_f32_overturned(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                                float per_force)
 {
@@ -64,7 +49,7 @@ int error_state_f32_overturned(struct error_state_f32_state *s, const struct err
     if (s->age < 0.5f * SETTLED || length < 0.5f * d->gravity || mean[2] > 0.5f * length) {
         return 0;
     }
-    error_state_f32_lean_upright(s->turn, load_vector_f32(mean));
+    error_state_f32_lean_upright(s->turn, mean);
     mean[0] = 0.0f;
     mean[1] = 0.0f;
     mean[2] = length;

@@ -1,0 +1,1 @@
+#include "../core/error_state_turning_f32.c"
