@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from factorlab.firmware.emulation import PERIOD_US, Emulation, Floats, frames_of_samples
 from factorlab.firmware.recorded import recorded_rows
 from factorlab.firmware.toolchain import require_tools, run_tool
-from sequential.errors import SolverError
+from sequential.errors import DataError, SolverError
 
-__all__ = ["CLOCK_HZ", "emulate_m4", "run_mps2", "tick_periods"]
+__all__ = ["CLOCK_HZ", "emulate_m4", "live_m4", "run_mps2", "tick_periods"]
 
+EMULATOR = "qemu-system-arm"
 CLOCK_HZ = 25e6  # of the mps2-an386
 BAUD = 500_000  # of the line that its bytes are put on afterwards
 PERIOD_S = PERIOD_US * 1e-6
@@ -149,19 +154,52 @@ def run_mps2(image: Path, rows: NDArray[np.void], *, command: str, shift: int) -
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rows.tofile(folder / "rows")
-        words = ",".join(f"arg={word}" for word in ("firmware", "rows", "log", command))
-        run_tool(
-            [
-                "qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none",
-                "-serial", "file:bytes", "-icount", f"shift={shift}",
-                "-semihosting-config", f"enable=on,target=native,{words}", "-kernel", str(image.resolve()),
-            ],
-            cwd=folder,
-            what=f"emulating {image.name}",
-        )  # fmt: skip
+        timed = ["-serial", "file:bytes", "-icount", f"shift={shift}"]
+        run_tool([*_qemu(image, command), *timed], cwd=folder, what=f"emulating {image.name}")
         data, log = (folder / "bytes").read_bytes(), np.fromfile(folder / "log", PERIOD)
     if not len(log) or log["row"][-1] != STACK:
         raise SolverError(
             f"{image.name} stopped after {len(log)} of {len(rows)} periods; build it anew with BOARD=qemu"
         )
     return data, log
+
+
+@contextmanager
+def live_m4(image: Path, counts: ArrayLike) -> Iterator[str]:
+    """Run an image in real time; gives the name of a pseudo-terminal that stands for its serial line.
+
+    It ends with the samples, or with the `with` block.  Its tick is as even as this computer lets it be.
+
+    Parameters
+    ----------
+    image : firmware.elf of firmware/ports/cortex_m4, BOARD=qemu CLOCK=systick
+    counts : (N, 7) rows, as `emulate_m4` takes them
+
+    Raises
+    ------
+    DataError
+        where the emulator does not start.
+    """
+    require_tools("m4", emulate=True)
+    rows = recorded_rows(counts, mode="q")
+    with tempfile.TemporaryDirectory() as name:
+        rows.tofile(Path(name) / "rows")
+        command = [*_qemu(image, ""), "-serial", "pty"]
+        with subprocess.Popen(command, cwd=name, stdout=subprocess.PIPE, text=True) as board:  # noqa: S603 - QEMU
+            try:
+                said = board.stdout.readline() if board.stdout else ""
+                terminal = re.search(r"/dev/\S+", said)
+                if terminal is None:
+                    raise DataError(f"{image} did not start in {EMULATOR}: {said.strip() or 'no word'}")
+                yield terminal.group()
+            finally:
+                board.kill()
+
+
+def _qemu(image: Path, command: str) -> list[str]:
+    """All but the serial line and the time; the rows and the log lie in the folder where it runs."""
+    words = ",".join(f"arg={word}" for word in ("firmware", "rows", "log", command) if word)
+    return [
+        EMULATOR, "-M", "mps2-an386", "-display", "none", "-monitor", "none",
+        "-semihosting-config", f"enable=on,target=native,{words}", "-kernel", str(image.resolve()),
+    ]  # fmt: skip

@@ -1,11 +1,16 @@
 """The board of a Cortex-M4F: the application in QEMU, on a sensor that we invent."""
 
+import json
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from factorlab.firmware.m4 import emulate_m4, tick_periods
+from factorlab.cli import main
+from factorlab.firmware.m4 import emulate_m4, live_m4, tick_periods
 from factorlab.firmware.recorded import FAULTS
 from sequential.errors import DataError, ShapeError, ToolMissingError
+from sequential.readers import read_imu
 from sequential.readers.serial import Status
 
 GOOD, ABSENT, HUNG, BUS = (FAULTS[name] for name in ("good", "absent", "hung", "bus"))
@@ -63,6 +68,24 @@ def test_ticks_of_the_real_timer_are_even(m4_image, qemu, counts):
     assert len(periods) >= 100
     # 25 MHz / 100 Hz, with reading, serial line and interrupts going on
     np.testing.assert_array_equal(periods, 250_000)
+
+
+def test_a_recording_comes_over_the_serial_line(m4_image, qemu, counts, tmp_path):
+    path = tmp_path / "imu.csv"
+    options = ["-o", str(path), "--seconds", "1", "--json"]
+    with live_m4(m4_image(FILTER="none", CLOCK="systick"), counts) as port:
+        done = CliRunner().invoke(main, ["record", "serial", port, *options])
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    # the recorder asks for the boot frame and for raw frames: both ways of the line are in use
+    assert told["board"]["target"] == "mps2-an386"
+    assert told["corrupt"] == 0
+    recording = read_imu(path)
+    scales = [8 * 9.80665 / 32768] * 3 + [np.radians(2000) / 32768] * 3
+    found = np.rint(np.hstack([recording.accel, recording.gyro]) / scales).astype(int)
+    known = {tuple(row) for row in counts[:, [0, 1, 2, 4, 5, 6]].tolist()}
+    assert len(found) > 50
+    assert all(tuple(row) in known for row in found.tolist())
 
 
 def test_instructions_are_counted_without_the_marks(recorder, counts):

@@ -1,7 +1,9 @@
 """The board file of an STM32F4: registers, image, I2C on a model of it, the rest in QEMU's STM32F405."""
 
+import shutil
 import subprocess
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -163,3 +165,26 @@ def test_image_runs_without_a_sensor_and_obeys(stm32f4, qemu, phase):
     steps = np.diff([frame.t_us for frame in others])
     assert (steps > 0).all()
     np.testing.assert_array_equal(steps % 10_000, 0)
+
+
+@pytest.mark.parametrize("tool", ["st-flash", "openocd"])
+def test_make_flash_writes_the_image_with_the_tool_at_hand(firmware_dir, arm_toolchain, tmp_path, tool):
+    # a tool that says what it was asked to do; of the machine's own tools only those that building needs
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for name in ("make", "sh", "mkdir", "cmp", "dirname", "cat", arm_toolchain, "arm-none-eabi-objcopy"):
+        (tools / Path(name).name).symlink_to(shutil.which(name))
+    (tools / tool).write_text('#!/bin/sh\necho flashing "$@"\n', encoding="utf-8")
+    (tools / tool).chmod(0o755)
+    port, out = firmware_dir / "ports" / "cortex_m4", tmp_path / "out"
+    asked = ["make", "-s", "-C", str(port), "flash", "BOARD=stm32f4", "FILTER=none", f"OUT={out}"]
+    environment = {"PATH": str(tools)}
+    done = subprocess.run(asked, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    wanted = f"{out}/firmware.bin 0x08000000" if tool == "st-flash" else f"program {out}/firmware.elf verify"
+    assert "flashing" in done.stdout
+    assert wanted in done.stdout
+    (tools / tool).unlink()
+    done = subprocess.run(asked, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "apt install stlink-tools" in done.stderr
