@@ -11,6 +11,7 @@ __all__ = ["firmware"]
 COMMANDS = {
     "build": ("factorlab.cli.firmware_build", "build", "An image for a board: filter, driver, serial line."),
     "emulate": ("factorlab.cli.firmware_emulate", "emulate", "Run an image on a recording, without a board."),
+    "verify": ("factorlab.cli.firmware_verify", "verify", "The C filters against the Python ones."),
 }
 
 

@@ -2,15 +2,24 @@
  *
  * Port C asks for a sample, port B is high while the filter works; both are stamped with the cycle outside.  The
  * letter box's address stands in GPIOR2:GPIOR1 before the first question.  Nothing here runs on a board.
+ *
+ * The filter is MODULE (mahony_q unless given), whose constants at 100 Hz are in HEADER.
  */
-#include "../core/mahony_q_100hz.h"
+#ifndef MODULE
+#define MODULE mahony_q
+#define HEADER "../core/mahony_q_100hz.h"
+#endif
+#include HEADER
 
 #include <avr/io.h>
+
+#define JOINED(a, b) a##b
+#define NAMED(a, b) JOINED(a, b)
 
 struct letter_box {
     uint8_t periods; /* 0: start anew */
     struct imu_q sample;
-    struct mahony_q_state state;
+    struct NAMED(MODULE, _state) state;
 };
 
 static struct letter_box box;
@@ -25,10 +34,10 @@ int main(void)
         PORTC = 1;
         __asm__ volatile("" ::: "memory");
         if (box.periods == 0U) {
-            mahony_q_start(&box.state, &mahony_q_100hz, &box.sample);
+            NAMED(MODULE, _start)(&box.state, &NAMED(MODULE, _100hz), &box.sample);
         }
         PORTB = 1;
-        mahony_q_step(&box.state, &mahony_q_100hz, &box.sample, box.periods);
+        NAMED(MODULE, _step)(&box.state, &NAMED(MODULE, _100hz), &box.sample, box.periods);
         PORTB = 0;
         __asm__ volatile("" ::: "memory");
         PORTC = 0;

@@ -8,6 +8,10 @@ from attitude_worlds import seen, swinging
 from click.testing import CliRunner
 
 from factorlab.cli import main
+from factorlab.datasets.recordings import open_recording
+from factorlab.firmware import targets
+from factorlab.firmware.emulation import mpu6050_counts
+from factorlab.firmware.targets import target_parity
 from sequential.attitude import attitude_from_angles
 from sequential.readers import read_tum
 from sequential.sensors import AffineCalibration, ImuCalibration
@@ -125,3 +129,38 @@ def test_a_log_without_gyro_is_refused(tmp_path):
     done = run("emulate", path, "--units", "accel=m/s^2,t=s", "--target", "avr")
     assert done.exit_code == 1
     assert "gyro" in done.stderr
+
+
+def test_the_c_filters_are_verified(log, tmp_path, c_compiler):
+    done = run("verify", log, *UNITS, "--no-emulation", "--json", "--check", "-o", tmp_path / "out")
+    assert done.exit_code == 0, done.stderr
+    whole = json.loads(done.stdout)
+    assert {row["filter"] for row in whole["filters"]} >= {
+        "c-mahony",
+        "c-mahony-q",
+        "c-kalman",
+        "c-complementary",
+    }
+    assert all(row["passed"] for row in whole["filters"])
+    assert whole["conclusion"] == "Every comparison clears its bar."
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "C less Python over time" in page
+    assert "mahony_q" in page, "the table of memory is there"
+
+
+def test_boards_that_cannot_be_emulated_are_named(log, monkeypatch, c_compiler):
+    monkeypatch.setattr(targets, "missing_tools", lambda target, **_: (f"tools-of-{target}",))
+    whole = json.loads(run("verify", log, *UNITS, "--json").stdout)
+    assert "apt install tools-of-avr tools-of-m4" in whole["conclusion"]
+    assert all(row["passed"] is None for row in whole["targets"])
+
+
+def test_an_emulated_board_is_this_computer(log, arm_toolchain, qemu, c_compiler):
+    counts = mpu6050_counts(open_recording(log, units=UNITS[1]).recording)[:300]
+    found = target_parity("mahony_q", "m4", counts)
+    assert (found.passed, found.differing, found.samples) == (True, 0, 300)
+
+
+def test_verify_without_a_log_takes_its_own(c_compiler):
+    whole = json.loads(run("verify", "--no-emulation", "--json").stdout)
+    assert {row["recording"] for row in whole["filters"]} == {"simulated"}
