@@ -38,7 +38,7 @@ static inline uint16_t divide_q(uint32_t a, uint16_t b)
                 "inc  %A[a]           \n\t"
                 "3: dec  %[bits]      \n\t"
                 "brne 1b              \n\t"
-                : [a] "+r"(a), [bits] "+r"(bits)
+                : [a] "+&r"(a), [bits] "+&r"(bits)
                 : [b] "r"(b));
         return (uint16_t)a;
     }

@@ -77,7 +77,7 @@ static uint32_t inverse(uint32_t x)
     const uint16_t first = divide_q(QUARTER, (uint16_t)((x + 0x8000U) >> 16)); /* Q16 */
     const int32_t off = INT32_C(0x20000000) - mul32u16_q((int32_t)(x >> 1), first); /* 1 - x first, Q29 */
 
-    return ((uint32_t)first << 16) + (uint32_t)(8 * high16_q(mul16u_q(narrow_q(off), first)));
+    return ((uint32_t)first << 16) + (uint32_t)(INT32_C(8) * high16_q(mul16u_q(narrow_q(off), first)));
 }
 
 /* b <- b - c (c g), not below 0. */

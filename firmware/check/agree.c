@@ -1,0 +1,258 @@
+/* Whether fixed point is the same everywhere: every module on samples that the target makes itself, as checksums.
+ *
+ * Prints a line a module and block of 1 000 samples, "<module> <block> <checksum>", then "end": a computer, a Cortex-M4
+ * and an AVR must print the same text.  Samples are calm motion, noise of all bits, the ends of the formats, zeros
+ * and runs of them, with periods that drop out; the state is never reset, so that one wrong bit stays.
+ *
+ * AGREE_SAMPLES is their number; AGREE_MODULES chooses by bits (below), since an emulated AVR is slow.
+ * Source: samples by Marsaglia's xorshift (2003), checksums by Fowler, Noll and Vo (FNV-1a over words).
+ */
+#include "../core/calibration_q.h"
+#include "../core/complementary_q.h"
+#include "../core/complementary_q_100hz.h"
+#include "../core/fixed_q.h"
+#include "../core/mahony_q.h"
+#include "../core/mahony_q_100hz.h"
+#include "../core/tilt_q.h"
+#include "../core/tilt_q_100hz.h"
+#include "../core/trig_q.h"
+
+#include <stddef.h>
+
+#include "agree_target.h"
+
+#define TRIG 0x01
+#define CALIBRATION 0x02
+#define MAHONY 0x04
+#define TILT 0x08
+#define COMPLEMENTARY 0x10
+
+#ifndef AGREE_SAMPLES
+#define AGREE_SAMPLES 20000UL
+#endif
+#ifndef AGREE_MODULES
+#define AGREE_MODULES 0xFF
+#endif
+#define BLOCK 1000U
+
+static uint32_t random_state;
+static uint32_t checksum;
+static struct imu_q sample;
+static uint8_t periods;
+
+static uint32_t random_bits(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return random_state;
+}
+
+static void add(uint32_t word)
+{
+    checksum = (checksum ^ word) * UINT32_C(16777619);
+}
+
+static void add_all(const int32_t *words, uint8_t count)
+{
+    for (uint8_t i = 0; i < count; i++) {
+        add((uint32_t)words[i]);
+    }
+}
+
+/* One of the numbers at which arithmetic goes wrong. */
+static int32_t extreme(void)
+{
+    static const int32_t ends[8] = {0, 1, -1, INT32_MAX, -INT32_MAX, INT32_C(0x40000000), INT32_C(0x8000), -INT32_C(0x8000)};
+    const uint8_t which = (uint8_t)(random_bits() >> 24) & 15U;
+
+    return which < 8U ? ends[which] : (which == 8U ? INT32_MIN : (int32_t)random_bits());
+}
+
+/* Calm in three quarters of all runs of 64 samples. */
+static void next_sample(uint32_t k)
+{
+    static uint8_t kind;
+
+    if ((k & 63U) == 0U) {
+        kind = (uint8_t)(random_bits() >> 24);
+    }
+    periods = (random_bits() >> 25) == 0U ? (uint8_t)(random_bits() >> 24) : 1;
+    for (uint8_t i = 0; i < 3; i++) {
+        if (kind < 192U) {
+            sample.gyro[i] += ((int32_t)random_bits() >> 9) - (sample.gyro[i] >> 4);
+            sample.accel[i] = (int16_t)((i == 2U ? 2511 : 0) + ((int32_t)random_bits() >> 23));
+            sample.mag[i] = (kind & 1U) != 0 ? (int16_t)((i == 0U ? 5000 : -9000) + ((int32_t)random_bits() >> 22)) : 0;
+        } else if (kind < 224U) {
+            sample.gyro[i] = (int32_t)random_bits();
+            sample.accel[i] = (int16_t)(uint16_t)random_bits();
+            sample.mag[i] = (int16_t)(uint16_t)random_bits();
+        } else {
+            sample.gyro[i] = (kind & 2U) != 0 ? extreme() : 0;
+            sample.accel[i] = (kind & 1U) != 0 ? (int16_t)(uint16_t)((uint32_t)extreme() >> 16) : 0;
+            sample.mag[i] = (kind & 4U) != 0 ? (int16_t)(uint16_t)((uint32_t)extreme() >> 16) : 0;
+        }
+    }
+    if (kind < 192U && (k & 63U) == 0U) {
+        sample.gyro[0] = sample.gyro[1] = sample.gyro[2] = 0; /* after what noise has left */
+    }
+}
+
+static void trig_step(uint8_t first)
+{
+    const int32_t y = extreme();
+    const int32_t x = extreme();
+    int32_t q[4];
+    int32_t both[2];
+    int16_t angles[3];
+    uint32_t length;
+
+    (void)first;
+    add(polar_q32(y, x, &length));
+    add(length);
+    add((uint16_t)atan2_q(x >> 9, y >> 7));
+    add((uint16_t)asin_q(y >> 1));
+    sincos_q((uint32_t)x, &both[0], &both[1]);
+    add_all(both, 2);
+    for (uint8_t i = 0; i < 4; i++) {
+        q[i] = extreme();
+    }
+    angles_q(q, angles);
+    for (uint8_t i = 0; i < 3; i++) {
+        add((uint16_t)angles[i]);
+    }
+}
+
+static void calibration_step(uint8_t first)
+{
+    struct affine_q affine;
+    struct imu_raw raw;
+    struct imu_q out;
+
+    (void)first;
+    for (uint8_t i = 0; i < 3; i++) {
+        for (uint8_t j = 0; j < 3; j++) {
+            affine.matrix[i][j] = (sample.mag[0] & 1) != 0 ? extreme() : (int32_t)random_bits() >> 7;
+        }
+        affine.shift[i] = extreme();
+        raw.gyro[i] = (int16_t)(uint16_t)random_bits();
+        raw.accel[i] = sample.accel[i];
+        raw.mag[i] = sample.mag[i];
+    }
+    calibrate_q(&affine, &affine, &affine, &raw, &out);
+    add_all(out.gyro, 3);
+    for (uint8_t i = 0; i < 3; i++) {
+        add((uint16_t)out.accel[i]);
+        add((uint16_t)out.mag[i]);
+    }
+}
+
+static void mahony_step(uint8_t first)
+{
+    static struct mahony_q_state state;
+    int32_t q[4];
+
+    if (first != 0U) {
+        mahony_q_start(&state, &mahony_q_100hz, &sample);
+    }
+    mahony_q_step(&state, &mahony_q_100hz, &sample, first != 0U ? 0 : periods);
+    mahony_q_attitude(&state, q);
+    add_all(q, 4);
+    add_all(state.bias, 3);
+    add(state.status);
+}
+
+static void tilt_step(uint8_t first)
+{
+    static struct tilt_q_state state;
+    int32_t q[4];
+
+    if (first != 0U) {
+        tilt_q_start(&state, &tilt_q_100hz, &sample);
+    }
+    tilt_q_step(&state, &tilt_q_100hz, &sample, first != 0U ? 0 : periods);
+    tilt_q_attitude(&state, q);
+    add_all(q, 4);
+    tilt_q_gyro_bias(&state, &tilt_q_100hz, q);
+    add_all(q, 3);
+    for (uint8_t i = 0; i < 3; i++) {
+        add(state.channel[i].angle);
+        add(state.channel[i].p);
+        add((uint32_t)state.channel[i].c);
+        add(state.channel[i].b);
+    }
+    add(state.status);
+}
+
+static void complementary_step(uint8_t first)
+{
+    static struct complementary_q_state state;
+
+    if (first != 0U) {
+        complementary_q_start(&state, &complementary_q_100hz, &sample);
+    }
+    complementary_q_step(&state, &complementary_q_100hz, &sample, first != 0U ? 0 : periods);
+    add_all(state.q, 4);
+    add(state.status);
+}
+
+/* `value` in 8 hexadecimal digits, or a small number in decimals. */
+static void print_hex(uint32_t value)
+{
+    for (uint8_t i = 0; i < 8; i++) {
+        const uint8_t digit = (uint8_t)(value >> 28);
+        target_print((char)(digit < 10U ? '0' + digit : 'a' - 10 + digit));
+        value <<= 4;
+    }
+}
+
+static void print_text(const char *text)
+{
+    while (*text != '\0') {
+        target_print(*text++);
+    }
+}
+
+static void run(const char *name, void (*step)(uint8_t first))
+{
+    random_state = UINT32_C(2463534242);
+    checksum = UINT32_C(2166136261);
+    for (uint8_t i = 0; i < 3; i++) {
+        sample.gyro[i] = 0;
+    }
+    for (uint32_t k = 0; k < AGREE_SAMPLES; k++) {
+        next_sample(k);
+        step(k == 0U);
+        if ((k + 1U) % BLOCK == 0U) {
+            print_text(name);
+            target_print(' ');
+            print_hex((k + 1U) / BLOCK);
+            target_print(' ');
+            print_hex(checksum);
+            target_print('\n');
+        }
+    }
+}
+
+int main(void)
+{
+    target_start();
+    if ((AGREE_MODULES & TRIG) != 0) {
+        run("trig_q", trig_step);
+    }
+    if ((AGREE_MODULES & CALIBRATION) != 0) {
+        run("calibration_q", calibration_step);
+    }
+    if ((AGREE_MODULES & MAHONY) != 0) {
+        run("mahony_q", mahony_step);
+    }
+    if ((AGREE_MODULES & TILT) != 0) {
+        run("tilt_q", tilt_step);
+    }
+    if ((AGREE_MODULES & COMPLEMENTARY) != 0) {
+        run("complementary_q", complementary_step);
+    }
+    print_text("end\n");
+    target_stop();
+    return 0;
+}
