@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.attitude.tilt_kalman import TiltKalman
-from sequential.firmware.filters import FirmwareFilter
+from sequential.firmware.filters import FirmwareFilter, FixedPointFilter
 
-__all__ = ["CTiltKalman"]
+__all__ = ["CTiltKalman", "CTiltKalmanFixed"]
 
 FIELDS = ("gyro_density", "bias_walk", "tilt_sigma", "heading_sigma", "gate", "bias_sigma")
 
@@ -59,3 +59,43 @@ class CTiltKalman(FirmwareFilter):
     def settings(self) -> NDArray[np.float64]:
         """What the binding takes, in the order of FIELDS."""
         return tilt_settings(self.design)
+
+
+@final
+@dataclass(frozen=True)
+class CTiltKalmanFixed(FixedPointFilter):
+    """`TiltKalman` in fixed point: firmware/core/tilt_q.c, the same bits on this machine, an M4 and an AVR.
+
+    Parameters
+    ----------
+    magnetometer : use it for yaw or not; None where `design` says nothing and the recording has one
+    rate : nominal samples a second; None for those of the recording, or, sample by sample, 100
+    design : its settings
+    bias_limit : the biases stay within ± this, rad/s; `TiltKalman` has no limit
+
+    Notes
+    -----
+    State (n,) of `start` and `step`: the quaternion, then the C struct as it lies in memory.
+    """
+
+    design: TiltKalman = field(default_factory=TiltKalman)
+    bias_limit: float = 1.0
+
+    ENTRY: ClassVar[str] = "tilt_q"
+    FIELDS: ClassVar[tuple[str, ...]] = (*FIELDS, "bias_limit")
+    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias")
+
+    @property
+    def name(self) -> str:
+        """c-kalman-q."""
+        return "c-kalman-q"
+
+    @property
+    def reference(self) -> TiltKalman:
+        """The Python filter."""
+        return self.design
+
+    @property
+    def settings(self) -> NDArray[np.float64]:
+        """What the binding takes, in the order of FIELDS."""
+        return np.append(tilt_settings(self.design), self.bias_limit)
