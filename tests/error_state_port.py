@@ -20,6 +20,7 @@ FLAGS = [
 STRUCTS = structs("error_state_f32.h")
 State, Derived, Settings = (STRUCTS[f"error_state_f32_{name}"] for name in ("state", "derived", "settings"))
 SAMPLE = np.dtype([("gyro", "<f4", 3), ("accel", "<f4", 3), ("mag", "<f4", 3)])
+STRICT = ("-fsanitize=undefined", "-fno-sanitize-recover=all", "-static-libubsan")
 NEED_SETTINGS = ("covariance", "covariance_6d")
 NAN = np.full(3, np.nan)
 # where a number or a run of numbers stands in the Python state, by the name of the field in C
@@ -143,10 +144,10 @@ class Port:
         return numbers
 
 
-def build(compiler, folder: Path) -> Path:
-    """The filter as a shared library in a folder."""
+def build(compiler, folder: Path, *more: str) -> Path:
+    """The filter as a shared library in a folder, with more flags of the compiler."""
     library = folder / "error_state.so"
-    command = [compiler, *FLAGS, "-shared", "-fPIC", *map(str, SOURCES), "-o", str(library), "-lm"]
+    command = [compiler, *FLAGS, *more, "-shared", "-fPIC", *map(str, SOURCES), "-o", str(library), "-lm"]
     subprocess.run(command, check=True)
     return library
 
