@@ -137,6 +137,33 @@ def qemu() -> str:
     return found
 
 
+@pytest.fixture(scope="session")
+def cpp_compiler() -> str:
+    """A compiler of C++."""
+    found = shutil.which("g++") or shutil.which("c++")
+    if found is None:
+        pytest.skip("needs a C++ compiler: install Debian's g++")
+    return found
+
+
+@pytest.fixture(scope="session")
+def clang() -> str:
+    """The other compiler of C99, which brings libFuzzer."""
+    found = shutil.which("clang-14") or shutil.which("clang")
+    if found is None:
+        pytest.skip("needs clang: install Debian's clang-14 and libclang-rt-14-dev")
+    return found
+
+
+@pytest.fixture(scope="session")
+def cppcheck() -> str:
+    """The static analysis of C."""
+    found = shutil.which("cppcheck")
+    if found is None:
+        pytest.skip("needs the static analysis of C: install Debian's cppcheck")
+    return found
+
+
 # --- no silent skips: where FACTORLAB_NO_SKIP is set, a skip is a failure that gives the skip's reason ---
 
 

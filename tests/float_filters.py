@@ -59,7 +59,13 @@ def published_seen(_python: AttitudeFilter, state: np.ndarray) -> np.ndarray:
     return state[:7]
 
 
-MAHONY = Pair("mahony_f32", ("mahony_f32", "mahony_f32_settings"), Mahony(), mahony_numbers, mahony_seen)
+MAHONY = Pair(
+    "mahony_f32",
+    ("mahony_f32", "mahony_f32_published", "mahony_f32_settings"),
+    Mahony(),
+    mahony_numbers,
+    mahony_seen,
+)
 
 
 def complementary_numbers(state: Any) -> list[float]:

@@ -23,7 +23,10 @@ STRICT = (
     "-fdata-sections",
     "-fstack-usage",
 )
-M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-math-errno", "-O2")
+M4 = (
+    "-mcpu=cortex-m4", "-mtune=cortex-r5", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16",
+    "-fno-math-errno", "-O2",
+)  # fmt: skip
 AVR = ("-mmcu=atmega328p", "-DF_CPU=16000000UL", "-O2")
 ALONE = ("-nostartfiles", "--specs=nano.specs", "--specs=nosys.specs", "-Wl,-e,main")
 # compiler and its tools, flags, what links without a port around it

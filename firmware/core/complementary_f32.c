@@ -58,7 +58,7 @@ void complementary_f32_step(struct complementary_f32_state *restrict s,
     const struct vector_f32 gyro = load_vector_f32(sample->gyro), accel = load_vector_f32(sample->accel);
     const float force = dot_f32(accel, accel);
     struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
-    if (!finite_f32(gyro)) {
+    if (!is_rate_f32(gyro)) {
         return;
     }
     if (!steady_f32(dt)) {

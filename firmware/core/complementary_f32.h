@@ -10,7 +10,7 @@
  * Cost: firmware/budget.csv.
  *
  * What it does with bad input
- *   gyro NaN or infinite         the sample changes nothing at all
+ *   gyro NaN, infinite, above 8192 rad/s   the sample changes nothing at all
  *   accelerometer NaN, infinite, zero   the sample turns by the gyro alone
  *   accelerometer saturated      its direction is wrong by what it is wrong, times dt/tau
  *   gyro stuck at b              the angles are off by b * tau

@@ -99,8 +99,10 @@ INLINE_F32 struct heading heading_error(struct mahony_f32_state *restrict s,
     const float length = sqrtf(level);
     s->since_field = 0.0f;
     if (RARELY_F32(!s->heading_known)) {
-        *q = north_set_f32(*q, east / length, north / length);
-        s->heading_known = 1;
+        if (usable_f32(level)) { /* or else it is no unit vector */
+            *q = north_set_f32(*q, east / length, north / length);
+            s->heading_known = 1;
+        }
         return none;
     }
     if (RARELY_F32(age > OLDEST)) {
@@ -118,22 +120,6 @@ INLINE_F32 struct heading heading_error(struct mahony_f32_state *restrict s,
         found.times = found.times != 0.0f ? age : 0.0f;
     }
     return found;
-}
-
-INLINE_F32 float clamped(float x, float limit)
-{
-    return x > limit ? limit : (x < -limit ? -limit : x);
-}
-
-/* A bias in its limits; it hardly ever is at them, which one comparison of the three sizes tells. */
-INLINE_F32 struct vector_f32 limited(struct vector_f32 v, const struct mahony_f32_derived *restrict d)
-{
-    if (RARELY_F32((uint32_t)((bits_f32(v.x) | bits_f32(v.y) | bits_f32(v.z)) << 1) > d->bias_bound)) {
-        v.x = clamped(v.x, d->bias_limit);
-        v.y = clamped(v.y, d->bias_limit);
-        v.z = clamped(v.z, d->bias_limit);
-    }
-    return v;
 }
 
 /* A time step that nothing is integrated over begins the quick start anew. */
@@ -159,7 +145,7 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
 {
     const struct vector_f32 gyro = load_vector_f32(sample->gyro), zero = {0.0f, 0.0f, 0.0f};
     float kp = d->gain, kh = d->heading_gain, ki = d->integral_gain, counts = 0.0f;
-    if (RARELY_F32(!finite_f32(gyro))) {
+    if (RARELY_F32(!is_rate_f32(gyro))) {
         return;
     }
     if (RARELY_F32(!steady_f32(dt))) {
@@ -194,7 +180,7 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
         heading = heading_error(s, d, rows, load_vector_f32(sample->mag), dt, &q);
         bias = minus_f32(bias, heading.axis, ki * heading.times);
     }
-    bias = limited(minus_f32(bias, tilt, ki * counts), d);
+    bias = limited_f32(minus_f32(bias, tilt, ki * counts), d->bias_limit, d->bias_bound);
     store_vector_f32(s->gyro_bias, bias);
     struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, kp * counts);
     if (with_field) {
@@ -215,39 +201,19 @@ void mahony_f32_step_6d(struct mahony_f32_state *restrict s, const struct mahony
     step(s, d, sample, dt, 0);
 }
 
-void mahony_f32_step_published(struct mahony_f32_state *restrict s,
-                               const struct mahony_f32_derived *restrict d,
-                               const struct imu_f32 *restrict sample, float dt)
-{
-    const struct vector_f32 gyro = load_vector_f32(sample->gyro), accel = load_vector_f32(sample->accel);
-    if (RARELY_F32(!finite_f32(gyro))) {
-        return;
-    }
-    if (RARELY_F32(!steady_f32(dt))) {
-        dt = 0.0f;
-    }
-    const struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
-    struct vector_f32 bias = load_vector_f32(s->gyro_bias), r = scaled_f32(gyro, dt);
-    const float force = dot_f32(accel, accel);
-    if (usable_f32(force)) {
-        const float times = 2.0f * dt / sqrtf(force);
-        const struct vector_f32 error = cross_f32(accel, half_up_f32(q));
-        bias = limited(minus_f32(bias, error, d->integral_gain * times), d);
-        r = plus_f32(r, error, d->gain * times);
-        store_vector_f32(s->gyro_bias, bias);
-    }
-    r = minus_f32(r, bias, dt);
-    store_quaternion_f32(s->world_q_body, turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r))));
-}
-
 void mahony_f32_start(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
                       const struct imu_f32 *restrict first)
 {
+    const struct vector_f32 gyro = load_vector_f32(first->gyro), accel = load_vector_f32(first->accel);
     (void)d;
     memset(s, 0, sizeof *s);
-    store_quaternion_f32(s->world_q_body, level_f32(load_vector_f32(first->accel)));
-    memcpy(s->mean_gyro, first->gyro, sizeof s->mean_gyro);
-    memcpy(s->mean_accel, first->accel, sizeof s->mean_accel);
+    store_quaternion_f32(s->world_q_body, level_f32(accel));
+    if (is_rate_f32(gyro)) {
+        store_vector_f32(s->mean_gyro, gyro);
+    }
+    if (usable_f32(dot_f32(accel, accel))) {
+        store_vector_f32(s->mean_accel, accel);
+    }
     s->starting = 1;
 }
 

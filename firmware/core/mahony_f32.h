@@ -17,7 +17,7 @@
  * `mahony_f32_step_published` 122/151; firmware/budget.csv.
  *
  * What it does with bad input
- *   gyro NaN or infinite         the sample changes nothing at all
+ *   gyro NaN, infinite, above 8192 rad/s   the sample changes nothing at all
  *   accelerometer NaN, infinite, zero   the sample turns by the gyro alone, and time at rest begins anew
  *   accelerometer saturated      its direction is wrong: the limit on e holds the tilt to error_limit * gain
  *   gyro stuck                   looks like rest; no further than bias_limit can it be taken for a bias

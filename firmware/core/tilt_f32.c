@@ -96,7 +96,7 @@ void tilt_f32_step(struct tilt_f32_state *restrict s, const struct tilt_f32_deri
 {
     const struct vector_f32 accel = load_vector_f32(sample->accel), mag = load_vector_f32(sample->mag);
     float roll, pitch;
-    if (!finite_f32(load_vector_f32(sample->gyro))) {
+    if (!is_rate_f32(load_vector_f32(sample->gyro))) {
         return;
     }
     if (!steady_f32(dt)) {

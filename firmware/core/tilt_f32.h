@@ -12,7 +12,7 @@
  * Cost: firmware/budget.csv.
  *
  * What it does with bad input
- *   gyro NaN or infinite         the sample changes nothing at all
+ *   gyro NaN, infinite, above 8192 rad/s   the sample changes nothing at all
  *   accelerometer NaN, infinite, zero   predicted, not corrected: the variances grow
  *   accelerometer saturated      a wrong angle; beyond the gate it is refused
  *   gyro stuck                   its rate is a bias, drawn to at the pace that bias_walk says

@@ -123,10 +123,10 @@ INLINE_F32 struct quaternion_f32 level_f32(struct vector_f32 accel)
     struct quaternion_f32 q;
     float cr = 1.0f, sr = 0.0f, cp = 1.0f, sp = 0.0f;
     if (usable_f32(squared)) {
-        const float flat = sqrtf(accel.y * accel.y + accel.z * accel.z);
+        const float across = accel.y * accel.y + accel.z * accel.z, flat = sqrtf(across);
         const float scale = 1.0f / sqrtf(squared);
         half_angle_f32(flat * scale, -accel.x * scale, &cp, &sp);
-        if (flat > 0.0f) {
+        if (usable_f32(across)) {
             half_angle_f32(accel.z / flat, accel.y / flat, &cr, &sr);
         }
     }

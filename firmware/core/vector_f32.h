@@ -111,16 +111,31 @@ INLINE_F32 int below_f32(float x, uint32_t bound)
     return (uint32_t)(bits_f32(x) << 1) < bound;
 }
 
-/* Whether all of a vector is finite, and its sum too. */
-INLINE_F32 int finite_f32(struct vector_f32 v)
+/* Whether this is a rate that a gyro may say: of less than 8192 rad/s (470 000 deg/s), and no NaN in it. */
+INLINE_F32 int is_rate_f32(struct vector_f32 gyro)
 {
-    return below_f32(v.x + v.y + v.z, UINT32_C(0xFF000000));
+    return bits_f32(dot_f32(gyro, gyro)) < UINT32_C(0x4C800000);
 }
 
 /* Whether u is nearer to v than a bound on every axis. */
 INLINE_F32 int near_f32(struct vector_f32 u, struct vector_f32 v, uint32_t bound)
 {
     return below_f32(u.x - v.x, bound) && below_f32(u.y - v.y, bound) && below_f32(u.z - v.z, bound);
+}
+
+INLINE_F32 float clamped_f32(float x, float limit)
+{
+    return x > limit ? limit : (x < -limit ? -limit : x);
+}
+
+/* v with every axis within a limit, given also as its bound; it hardly ever is beyond, which one comparison of
+ * the three sizes tells. */
+INLINE_F32 struct vector_f32 limited_f32(struct vector_f32 v, float limit, uint32_t bound)
+{
+    if (RARELY_F32((uint32_t)((bits_f32(v.x) | bits_f32(v.y) | bits_f32(v.z)) << 1) > bound)) {
+        return vector_f32(clamped_f32(v.x, limit), clamped_f32(v.y, limit), clamped_f32(v.z, limit));
+    }
+    return v;
 }
 
 /* Whether a time step is one to integrate over: 0 <= dt <= 1 s, and no NaN. */

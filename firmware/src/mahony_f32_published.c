@@ -1,0 +1,1 @@
+#include "../core/mahony_f32_published.c"
