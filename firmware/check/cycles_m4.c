@@ -1,12 +1,13 @@
 /* Instructions that one update of a filter takes on a Cortex-M4F, each update counted by itself.
  *
- * What it computes: reads samples (struct imu_f32 or imu_q, as they lie in memory) from the first argument, runs
- * MODULE's step on each and writes, a sample, a uint32 of instructions and the attitude (4 floats, or 4 int32 in Q30)
- * to the second.  Built by factorlab.firmware.instructions with -DHEADER, -DSTEP and the names below.
- * Source: QEMU runs 2^shift ns an instruction (-icount), and CMSDK timer 0 counts 25 MHz of that time: at shift 10 one
- * instruction is 25.6 counts, so that a difference of two readings is exact after rounding.  (DWT->CYCCNT reads 0.)
- * An empty step is counted the same way and taken off.  Instructions are not cycles: on silicon vsqrt and vdiv take 14,
- * a load 2.
+ * What it computes: reads samples (struct imu_f32 or imu_q, as they lie in memory) from the first argument,
+ * runs MODULE's step on each and writes, a sample, a uint32 of instructions and the attitude (4 floats, or 4
+ * int32 in Q30) to the second.  Built by factorlab.firmware.instructions with -DHEADER, -DSTEP and the names
+ * below.
+ * Source: QEMU runs 2^shift ns an instruction (-icount), and CMSDK timer 0 counts 25 MHz of that time: at
+ * shift 10 one instruction is 25.6 counts, so that a difference of two readings is exact after rounding.
+ * (DWT->CYCCNT reads 0.) An empty step is counted the same way and taken off.  Instructions are not cycles:
+ * on silicon vsqrt and vdiv take 14, a load 2.
  */
 #include HEADER
 
@@ -42,13 +43,15 @@ static struct DERIVED derived;
 static sample samples[ROWS];
 static struct update updates[ROWS];
 
-static __attribute__((noinline)) void empty(struct STATE *s, const struct DERIVED *d, const sample *i, interval t)
+static __attribute__((noinline)) void empty(struct STATE *s, const struct DERIVED *d, const sample *i,
+                                            interval t)
 {
     (void)t;
     __asm volatile("" ::"r"(s), "r"(d), "r"(i));
 }
 
-static __attribute__((noinline)) uint32_t count(step_function *volatile step, const sample *one, interval since)
+static __attribute__((noinline)) uint32_t count(step_function *volatile step, const sample *one,
+                                                interval since)
 {
     TIMER0->value = UINT32_MAX;
     const uint32_t before = TIMER0->value;

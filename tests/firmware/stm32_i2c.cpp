@@ -1,10 +1,9 @@
-// The I2C driver of firmware/ports/cortex_m4/stm32f4 on a model of the peripheral, which no emulator at hand has.
-//
-// The model follows RM0368 18.3 and 18.6: what sets and clears SB, ADDR, TXE, RXNE, BTF, AF; when the clock is held;
-// which byte an acknowledgement belongs to.  A device with 256 registers answers.  Arguments: a list of transfers
-// WRITTEN:READ[:FAULT], FAULT n (no such address), w (no acknowledgement after the first byte written), b (bus error),
-// h (holds the clock for ever), s (as good, but interrupts come late).  Prints a line a transfer: state, bytes read,
-// registers as the device has them.
+// The I2C driver of firmware/ports/cortex_m4/stm32f4 on a model of the peripheral, which no emulator at
+// hand has.  The model follows RM0368 18.3 and 18.6: what sets and clears SB, ADDR, TXE, RXNE, BTF, AF;
+// when the clock is held; which byte an acknowledgement belongs to.  A device with 256 registers answers.
+// Arguments: a list of transfers WRITTEN:READ[:FAULT], FAULT n (no such address), w (no acknowledgement
+// after the first byte written), b (bus error), h (holds the clock for ever), s (as good, but interrupts
+// come late).  Prints a line a transfer: state, bytes read, registers as the device has them.
 #include <stdint.h>
 
 #include <cstdio>
@@ -163,8 +162,9 @@ static void write_cr1(Register *self, uint32_t given)
 
 static void receive_byte()
 {
-    const bool acknowledge = (i2c1.cr1.value & I2C_CR1_POS) != 0 ? this_ack : (i2c1.cr1.value & I2C_CR1_ACK) != 0;
-    this_ack = (i2c1.cr1.value & I2C_CR1_ACK) != 0;
+    const bool asked = (i2c1.cr1.value & I2C_CR1_ACK) != 0;
+    const bool acknowledge = (i2c1.cr1.value & I2C_CR1_POS) != 0 ? this_ack : asked;
+    this_ack = asked;
     const uint8_t byte = device[device_at++];
     if (data_full) {
         shift = byte;

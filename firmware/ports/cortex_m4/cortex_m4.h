@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 struct systick {
-    volatile uint32_t ctrl;  /* bit 0: count, bit 1: interrupt, bit 2: processor clock, bit 16: reached zero */
+    volatile uint32_t ctrl;  /* bit 0: count, 1: interrupt, 2: processor clock, 16: reached zero */
     volatile uint32_t load;  /* clocks a period, less one */
     volatile uint32_t value; /* counts down; any write clears it */
 };

@@ -2,8 +2,8 @@
  *
  *     host ROWS BYTES [COMMAND]
  *
- * reads the rows of recorded/sensor.h, writes what the serial line would carry, and may begin with a command of one
- * letter.  A period follows the one before when nothing is left to do.
+ * reads the rows of recorded/sensor.h, writes what the serial line would carry, and may begin with a command
+ * of one letter.  A period follows the one before when nothing is left to do.
  */
 #include "../../app/board.h"
 

@@ -112,7 +112,8 @@ uint8_t recorded_transfer(uint8_t address, const uint8_t *write, uint8_t write_l
                           uint8_t read_length)
 {
     const uint8_t first = write[0];
-    if (address != MPU6050_ADDRESS || first + (write_length - 1U) > REGISTERS || first + read_length > REGISTERS) {
+    if (address != MPU6050_ADDRESS || first + (write_length - 1U) > REGISTERS ||
+        first + read_length > REGISTERS) {
         return BOARD_I2C_NO_ANSWER;
     }
     if (first == FIRST_COUNT && read_length > 0U && recorded.row < 0 && advance() == 0) {

@@ -1,11 +1,11 @@
 /* An MPU-6050 that answers with recorded counts: what the emulated boards have on their I2C bus.
  *
- * Computes: what the registers that the driver uses would say (reset, sleep, identity, ranges, the burst of 14
- * bytes), from rows of a recording, one a period, counted from the first burst on: a row that nobody fetched is
- * lost, as on a real sensor.
+ * Computes: what the registers that the driver uses would say (reset, sleep, identity, ranges, the burst of
+ * 14 bytes), from rows of a recording, one a period, counted from the first burst on: a row that nobody
+ * fetched is lost, as on a real sensor.
  * Source: InvenSense RM-MPU-6000A-00 4.2.
- * What it does with bad input: a row may say that the sensor does not answer, holds the bus, or that the bus fails;
- * a write past the registers is not acknowledged; before the first row and asleep it reads zeros.
+ * What it does with bad input: a row may say that the sensor does not answer, holds the bus, or that the bus
+ * fails; a write past the registers is not acknowledged; before the first row and asleep it reads zeros.
  */
 #ifndef FACTORLAB_RECORDED_SENSOR_H
 #define FACTORLAB_RECORDED_SENSOR_H

@@ -1,8 +1,8 @@
 /* The board of app/board.h on QEMU's mps2-an386: UART0 with interrupts, an I2C bus that a recording answers.
  *
- * A period follows the one before as soon as nothing is left to do (CLOCK=recording), or SysTick says so (CLOCK=systick).
- * There is no WFI: under -icount QEMU would sleep it out in the computer's time.  What the UART is given leaves at once;
- * it has no baud rate here.
+ * A period follows the one before as soon as nothing is left to do (CLOCK=recording), or SysTick says so
+ * (CLOCK=systick).  There is no WFI: under -icount QEMU would sleep it out in the computer's time.  What the
+ * UART is given leaves at once; it has no baud rate here.
  * Semihosting arguments: 1 the rows (recorded/sensor.h), 2 the log (log.h), 3 the first command, one letter.
  */
 #include "../../../app/board.h"
@@ -15,13 +15,12 @@
 #include "cmsdk.h"
 #include "log.h"
 #include "semihosting.h"
+#include "stack.h"
 
 #define ROWS 1U
 #define LOG 2U
 #define COMMAND 3U
 #define BAUD 115200UL
-#define PAINT 0xA5A5A5A5UL
-#define STACK_MARGIN 16 /* words left alone while it is painted */
 
 struct board {
     struct ring out, in;
@@ -34,8 +33,6 @@ struct board {
     volatile uint8_t first_due; /* 1: no byte has left in this period */
     uint8_t transfer;           /* BOARD_I2C_DONE ... */
 };
-
-extern uint32_t stack_watched[]; /* of the linker script: where the paint begins */
 
 const uint8_t board_target = BOOT_MPS2_AN386;
 static struct board board;
@@ -90,16 +87,6 @@ static void tick_handler(void)
     board.events |= BOARD_TICK;
 }
 
-/* What was painted and is no more. */
-static uint32_t stack_used(void)
-{
-    const uint32_t *low = stack_watched;
-    while (*low == PAINT) {
-        low++;
-    }
-    return (uint32_t)(stack_top - (const unsigned char *)low);
-}
-
 static void finish(void)
 {
     board.log = log_next();
@@ -131,18 +118,10 @@ static void log_empty(void)
     board_mark_update(0);
 }
 
-static void paint_stack(void)
-{
-    const uint32_t *end = (const uint32_t *)__builtin_frame_address(0) - STACK_MARGIN;
-    for (uint32_t *low = stack_watched; low < end; low++) {
-        *low = PAINT;
-    }
-}
-
 void board_start(void)
 {
     char command = '\0';
-    paint_stack();
+    stack_paint();
     TIMER0->reload = UINT32_MAX;
     TIMER0->value = UINT32_MAX;
     TIMER0->ctrl = 1;

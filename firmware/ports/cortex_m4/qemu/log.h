@@ -1,8 +1,8 @@
 /* When things happened in each period, for the computer that emulates us.
  *
  * Times are counts of CMSDK timer 0 (25 MHz), so that one instruction is 2^shift / 40 counts at QEMU's
- * `-icount shift=...`; 0 says that it did not happen.  The first record is not of a period: its row is LOG_EMPTY, and
- * its update one without a filter, to be taken off the others.  Nor is the last, LOG_STACK.
+ * `-icount shift=...`; 0 says that it did not happen.  The first record is not of a period: its row is
+ * LOG_EMPTY, and its update one without a filter, to be taken off the others.  Nor is the last, LOG_STACK.
  */
 #ifndef FACTORLAB_LOG_H
 #define FACTORLAB_LOG_H

@@ -1,7 +1,7 @@
-/* Files of the computer that emulates us: ARM semihosting ("Semihosting for AArch32 and AArch64", ARM IHI 0070).
+/* Files of the computer that emulates us: ARM semihosting (IHI 0070).
  *
- * Source: the calls SYS_OPEN 0x01, SYS_CLOSE 0x02, SYS_WRITE 0x05, SYS_READ 0x06, SYS_GET_CMDLINE 0x15, SYS_EXIT 0x18.
- * QEMU's arguments `-semihosting-config enable=on,target=native,arg=…,arg=…` are the words of the command line.
+ * Source: the calls SYS_OPEN 0x01, SYS_CLOSE 0x02, SYS_WRITE 0x05, SYS_READ 0x06, SYS_GET_CMDLINE 0x15,
+ * SYS_EXIT 0x18.  The words of the command line are QEMU's `-semihosting-config enable=on,arg=...,arg=...`.
  * What it does with bad input: a file that cannot be opened ends the emulation with an error.
  */
 #ifndef FACTORLAB_SEMIHOSTING_H

@@ -1,7 +1,8 @@
-/* The board of app/board.h on an STM32F4: SysTick begins a period, TIM2 its phase, the core sleeps in between.
+/* The board of app/board.h on an STM32F4: SysTick begins a period, TIM2 its phase, the core sleeps between.
  *
- * After a tick nothing begins to leave on the serial line before the phase, PHASE_..._US later: the burst of the sensor
- * takes 0.4 ms, and the update less than what is left, so that frames leave evenly whatever the filter had to do.
+ * After a tick nothing begins to leave on the serial line before the phase, PHASE_..._US later: the burst of
+ * the sensor takes 0.4 ms, and the update less than what is left, so that frames leave evenly whatever the
+ * filter had to do.
  */
 #include "../../../app/board.h"
 

@@ -4,9 +4,10 @@
  *                                                             --/7--> 48 MHz (USB, not used)
  *     AHB --/2--> APB1 42 MHz (USART2, I2C1); its timers count 84 MHz
  *
- * Source: RM0368 6.2 (84 MHz is the most of an F401, and within scale 2 of the regulator, which holds after reset).
- * What it does with bad input: without a sign of HSE for some 20 ms it goes on with HSI, which is 1 % off at 25 C; without
- * one of the PLL it stays at 16 MHz, everything then at 16/84 of its speed.
+ * Source: RM0368 6.2 (84 MHz is the most of an F401, and within scale 2 of the regulator, which holds after
+ * reset).
+ * What it does with bad input: without a sign of HSE for some 20 ms it goes on with HSI, which is 1 % off at
+ * 25 C; without one of the PLL it stays at 16 MHz, everything then at 16/84 of its speed.
  */
 #include "port.h"
 

@@ -1,15 +1,16 @@
 /* I2C1 at 400 kHz on PB8 (clock) and PB9 (data): bytes by interrupts, the main loop sleeps or computes.
  *
- * Source: RM0368 18.3.3, master transmitter and receiver.  The last bytes of a read are taken by BTF, when two lie in the
- * data and the shift register and the clock is held: so no deadline hangs on the acknowledgement being taken back in time
- * (a single byte: acknowledgement off before the address is cleared; two: POS).
+ * Source: RM0368 18.3.3, master transmitter and receiver.  The last bytes of a read are taken by BTF, when
+ * two lie in the data and the shift register and the clock is held: so no deadline hangs on the
+ * acknowledgement being taken back in time (a single byte: acknowledgement off before the address is
+ * cleared; two: POS).
  * tests/firmware/stm32_i2c.cpp runs this file against a model of the peripheral made after the same pages.
  */
 #include "../../../app/board.h"
 #include "port.h"
 
 #define BUS_HZ 400000UL
-#define CLOCKS (APB1_HZ / (3UL * BUS_HZ))       /* fast mode, low twice as long as high */
+#define CLOCKS (APB1_HZ / (3UL * BUS_HZ))             /* fast mode, low twice as long as high */
 #define RISE (APB1_HZ / 1000000UL * 3UL / 10UL + 1UL) /* 300 ns */
 #define SCL (1UL << 8)
 #define SDA (1UL << 9)

@@ -1,4 +1,5 @@
-/* USART2 on PA2 (transmit) and PA3 (receive), which is the USB serial line of a Nucleo-64: 8N1, rings and interrupts. */
+/* USART2 on PA2 (transmit) and PA3 (receive), which is the USB serial line of a Nucleo-64: 8N1, rings and
+ * interrupts. */
 #include "../../../app/board.h"
 #include "../ring.h"
 #include "port.h"
@@ -14,8 +15,8 @@
 static struct ring out, in;
 static volatile uint8_t held; /* 1: what is put waits for the phase */
 
-/* The handler changes this register as well.  QEMU's STM32F405 never asks for a byte by itself, hence the second line; a
- * real one does so at once. */
+/* The handler changes this register as well.  QEMU's STM32F405 never asks for a byte by itself, hence the
+ * second line; a real one does so at once. */
 static void ask_for_bytes(void)
 {
     interrupts_off();

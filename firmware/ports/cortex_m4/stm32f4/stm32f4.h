@@ -1,6 +1,6 @@
-/* The few registers used of an STM32F4, with their addresses: STMicroelectronics RM0368 (F401), section 2.3 and the
- * register maps of 3.8 (flash), 6.3 (RCC), 8.4 (GPIO), 13.4 (TIM2), 18.6 (I2C), 19.6 (USART).  RM0383 (F411) and RM0090
- * (F405, F407) have the same ones at the same places.
+/* The few registers used of an STM32F4, with their addresses: STMicroelectronics RM0368 (F401), section 2.3
+ * and the register maps of 3.8 (flash), 6.3 (RCC), 8.4 (GPIO), 13.4 (TIM2), 18.6 (I2C), 19.6 (USART).
+ * RM0383 (F411) and RM0090 (F405, F407) have the same ones at the same places.
  */
 #ifndef FACTORLAB_STM32F4_H
 #define FACTORLAB_STM32F4_H
