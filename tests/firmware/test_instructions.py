@@ -7,9 +7,11 @@ from factorlab.firmware.instructions import IMU_F32, IMU_Q, count_instructions, 
 from sequential.errors import DataError, ToolMissingError
 from sequential.sensors import ImuRecording
 
-# Spins magnetometer x times round a loop of two instructions, after three and before the return.
+# Spins magnetometer x times round a loop of two instructions, after three and before the return.  The attitude
+# shows whether initialised variables were filled, and others cleared.
 SPINNING = """
 #include "spin_{suffix}.h"
+static volatile int filled[3] = {{5, 6, 7}}, cleared[300];
 void spin_{suffix}_defaults(struct spin_{suffix}_settings *s) {{ s->gain = 0; }}
 void spin_{suffix}_derive(const struct spin_{suffix}_settings *s, {rate} struct spin_{suffix}_derived *d)
 {{ d->gain = s->gain; {use} }}
@@ -20,7 +22,8 @@ void spin_{suffix}_step(struct spin_{suffix}_state *s, const struct spin_{suffix
                         const struct imu_{suffix} *i, {interval} since)
 {{ __asm("{load}\\n1: subs r3, #1\\n bgt 1b\\n bx lr"); }}
 void spin_{suffix}_attitude(const struct spin_{suffix}_state *s, {component} *q)
-{{ q[0] = {one}; q[1] = q[2] = q[3] = ({component})s->count; }}
+{{ q[0] = {one}; q[1] = ({component})(s->count + filled[2] - 7);
+  q[2] = ({component})(filled[0] - 5); q[3] = ({component})cleared[299]; }}
 """
 DECLARED = """
 #include <stdint.h>

@@ -24,7 +24,7 @@
 #define HSI_MHZ 16UL
 #define PATIENCE 100000UL /* turns of a loop of a few clocks */
 
-static uint8_t appears(volatile uint32_t *where, uint32_t mask, uint32_t value)
+static uint8_t appears(const volatile uint32_t *where, uint32_t mask, uint32_t value)
 {
     for (uint32_t k = 0; k < PATIENCE; k++) {
         if ((*where & mask) == value) {
