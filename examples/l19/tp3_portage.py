@@ -101,8 +101,8 @@ def main():
 def check(apart, boards):
     """Ce que l'exemple affirme, pour ce qui a pu tourner."""
     for name, error in apart.items():
-        assert rms(error) < (0.1 if name == AVR else 0.01), f"{name} : le portage suit le Python"
-        assert np.abs(error).max() < (0.3 if name == AVR else 0.02)
+        assert rms(error) < 0.01, f"{name} : le portage suit le Python"
+        assert np.abs(error).max() < 0.03
     for emulation, _ in boards.values():
         assert emulation.lost == emulation.corrupt == 0, "aucune trame perdue"
     if AVR in boards:
