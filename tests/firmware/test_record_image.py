@@ -1,4 +1,4 @@
-"""`factorlab record serial` on the image for the ATmega328P, run in real time behind a pseudo-terminal."""
+"""`factorlab record serial` on the images for the boards, run in real time behind a pseudo-terminal."""
 
 import json
 from dataclasses import replace
@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from factorlab.cli import main
 from factorlab.firmware.avr import emulate_avr, live_avr
 from factorlab.firmware.emulation import mpu6050_counts
+from factorlab.firmware.m4 import live_m4
 from sequential.readers import read_imu
 from sequential.sensors import simulate_imu, tumble
 from sequential.sensors.calibration_header import c_header, calibration_hash, nominal_calibration
@@ -24,8 +25,28 @@ def counts(rng):
     return np.clip(mpu6050_counts(recording) + rng.integers(-4, 5, (1001, 7)), -32768, 32767)
 
 
-def recorded(image, counts, simulator, path, *options):
-    with live_avr(image, counts, simulator=simulator) as port:
+@pytest.fixture
+def live(avr_image, avr_simulator):
+    """The ATmega328P with a filter."""
+
+    def run(filter_, counts):
+        return live_avr(avr_image(FILTER=filter_), counts, simulator=avr_simulator)
+
+    return run
+
+
+@pytest.fixture
+def live_on_m4(m4_image, qemu):
+    """The Cortex-M4F with a filter."""
+
+    def run(filter_, counts):
+        return live_m4(m4_image(FILTER=filter_, CLOCK="systick"), counts)
+
+    return run
+
+
+def recorded(board, path, *options):
+    with board as port:
         done = CliRunner().invoke(
             main,
             ["record", "serial", port, "-o", str(path), "--seconds", str(SECONDS), "--json", *options],
@@ -33,38 +54,49 @@ def recorded(image, counts, simulator, path, *options):
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert (told["lost"], told["corrupt"], told["discarded"], told["missing"]) == (0, 0, 0, 0)
-    assert told["board"]["target"] == "atmega328p"
     assert told["samples"] == round(SECONDS * 100)
     assert told["timing"]["period_ms"] == 10.0
     return told
 
 
-def test_raw_samples_are_those_of_the_sensor(avr_image, avr_simulator, counts, tmp_path):
-    path = tmp_path / "imu.csv"
-    recorded(avr_image(FILTER="none"), counts, avr_simulator, path)
+def assert_samples(path, counts):
+    """The recording is a stretch of the counts, sample for sample."""
     imu = read_imu(path)
     scales = [8 * 9.80665 / 32768] * 3 + [np.radians(2000) / 32768] * 3
     found = np.rint(np.hstack([imu.accel, imu.gyro]) / scales).astype(int)
-    starts = np.flatnonzero((counts[:, [0, 1, 2, 4, 5, 6]] == found[0]).all(axis=1))
-    assert len(starts) == 1
-    window = counts[starts[0] : starts[0] + len(found)][:, [0, 1, 2, 4, 5, 6]]
-    np.testing.assert_array_equal(found, window)
+    served = counts[:, [0, 1, 2, 4, 5, 6]]
+    (start,) = np.flatnonzero((served == found[0]).all(axis=1))
+    np.testing.assert_array_equal(found, served[start : start + len(found)])
 
 
-def test_a_recording_of_the_board_goes_through_attitude(avr_image, avr_simulator, counts, tmp_path):
+def test_raw_samples_are_those_of_the_sensor(live, counts, tmp_path):
     path = tmp_path / "imu.csv"
-    recorded(avr_image(FILTER="none"), counts, avr_simulator, path)
+    told = recorded(live("none", counts), path)
+    assert (told["board"]["target"], told["board"]["filter"]) == ("atmega328p", "none")
+    assert_samples(path, counts)
+
+
+def test_raw_samples_of_the_other_board(live_on_m4, counts, tmp_path):
+    path = tmp_path / "imu.csv"
+    told = recorded(live_on_m4("mahony_f32", counts), path)
+    assert (told["board"]["target"], told["board"]["filter"]) == ("mps2-an386", "mahony_f32")
+    assert_samples(path, counts)
+
+
+def test_a_recording_of_the_board_goes_through_attitude(live, counts, tmp_path):
+    path = tmp_path / "imu.csv"
+    recorded(live("none", counts), path)
     done = CliRunner().invoke(main, ["attitude", str(path), "--filter", "mahony", "--json"])
     assert done.exit_code == 0, done.output
 
 
 @pytest.mark.parametrize("mode", ["quaternion", "angles", "text"])
 def test_attitudes_are_those_of_the_same_image_run_ahead_of_time(
-    avr_image, avr_simulator, counts, tmp_path, mode
+    live, avr_image, avr_simulator, counts, tmp_path, mode
 ):
     path = tmp_path / "attitude.csv"
     image = avr_image(FILTER="mahony_q")
-    told = recorded(image, counts, avr_simulator, path, "--mode", mode)
+    told = recorded(live("mahony_q", counts), path, "--mode", mode)
     assert told["board"]["filter"] == "mahony_q"
     rows = np.array(
         [[float(cell) for cell in line.split(",")[:8]] for line in path.read_text().splitlines()[2:]]
