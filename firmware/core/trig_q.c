@@ -128,9 +128,10 @@ int32_t cosine_q(uint32_t square, uint16_t *shortage)
 
 void sincos_q(uint32_t angle, int32_t *sine, int32_t *cosine)
 {
-    const uint8_t quarter = (uint8_t)((angle + UINT32_C(0x20000000)) >> 30);
-    const int32_t rest = (int32_t)(angle - ((uint32_t)quarter << 30)); /* +-45 deg */
-    const int32_t x = mul32_q(rest * 4, INT32_C(1686629713));          /* rad, Q30 */
+    const uint32_t ahead = angle + UINT32_C(0x20000000); /* by 45 deg */
+    const uint8_t quarter = (uint8_t)((uint8_t)(ahead >> 24) >> 6);
+    const int32_t rest = (int32_t)(ahead & UINT32_C(0x3FFFFFFF)) - INT32_C(0x20000000); /* +-45 deg */
+    const int32_t x = mul32_q(rest * 4, INT32_C(1686629713)); /* rad, Q30 */
     uint16_t shortage;
     const int32_t c = cosine_q((uint32_t)mul32_q(x, x) << 4, &shortage);
     const int32_t s = shortened_q(x, shortage);
