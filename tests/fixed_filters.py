@@ -40,6 +40,28 @@ void steps(struct MODULE_q_state *states, const struct imu_q *samples, const uin
         MODULE_q_step(&states[k], &MODULE_q_100hz, &samples[k], periods[k]);
     }
 }
+void soak(const struct imu_q *samples, int32_t count, int32_t rounds, struct MODULE_q_state *last,
+          double *range);
+void soak(const struct imu_q *samples, int32_t count, int32_t rounds, struct MODULE_q_state *last,
+          double *range)
+{
+    struct MODULE_q_state state;
+    MODULE_q_start(&state, &MODULE_q_100hz, samples);
+    for (int32_t round = 0; round < rounds; round++) {
+        for (int32_t k = 0; k < count; k++) {
+            int32_t q[4];
+            double squared = 0.0;
+            MODULE_q_step(&state, &MODULE_q_100hz, &samples[k], 1);
+            MODULE_q_attitude(&state, q);
+            for (int i = 0; i < 4; i++) {
+                squared += (double)q[i] * q[i] / 1152921504606846976.0;
+            }
+            range[0] = squared < range[0] ? squared : range[0];
+            range[1] = squared > range[1] ? squared : range[1];
+        }
+        last[round] = state;
+    }
+}
 void at_100_hz(struct MODULE_q_derived *derived, struct MODULE_q_derived *ours);
 void at_100_hz(struct MODULE_q_derived *derived, struct MODULE_q_derived *ours)
 {
@@ -78,6 +100,12 @@ class FixedFilter:
         periods = np.ascontiguousarray(periods, np.uint8)
         self.core.steps(pointer(states), pointer(samples), pointer(periods), len(states))
         return states
+
+    def soak(self, samples, rounds):
+        """States (rounds,) after each time through the samples; least and largest length of the attitude."""
+        last, squared = np.zeros(rounds, self.state), np.ones(2)
+        self.core.soak(pointer(samples), len(samples), rounds, pointer(last), pointer(squared))
+        return last, np.sqrt(squared)
 
     def constants(self, size):
         """Bytes of the derived constants of the defaults at 100 Hz, as derived and as the header has them."""

@@ -8,12 +8,16 @@
 
 #include "../core/calibration_f32.h"
 #include "../core/calibration_q.h"
+#include "../core/complementary_q.h"
+#include "../core/complementary_q_100hz.h"
 #include "../core/frame.h"
 #include "../core/imu.h"
 #include "../core/mahony_f32.h"
 #include "../core/mahony_q.h"
 #include "../core/mahony_q_100hz.h"
 #include "../core/text.h"
+#include "../core/tilt_q.h"
+#include "../core/tilt_q_100hz.h"
 #include "../core/trig_q.h"
 
 #endif /* FACTORLAB_H */

@@ -107,6 +107,17 @@ def test_a_vertical_field_tells_no_heading(filter_q):
     assert not with_field["heading_known"].any()
 
 
+@pytest.mark.slow
+def test_a_day_without_drift_of_the_length(filter_q, data_dir, pytestconfig):
+    """A day at 100 Hz with --full, three hours otherwise; overflow would end the process."""
+    samples, _ = resampled("broad:16")
+    rounds = (8_640_000 if pytestconfig.getoption("--full") else 1_000_000) // len(samples) + 1
+    last, length = filter_q.soak(samples, rounds)
+    np.testing.assert_allclose(length, 1.0, atol=5e-5)
+    up = [2 * (q[1] * q[3] - q[0] * q[2]) for q in last["q"][[1, -1]] / 2.0**30]
+    assert up[0] == pytest.approx(up[1], abs=1e-4), "the tilt at the end of a round stays"
+
+
 def test_any_state_sample_and_number_of_periods(filter_q, rng):
     """Bits of any kind: nothing overflows (the library traps it), and the length comes back."""
     count = 20_000

@@ -182,6 +182,19 @@ def test_a_stuck_gyro_becomes_bias_up_to_its_limit(filter_q):
     assert np.abs(biases(held)).max() <= 0.01 + 1e-9
 
 
+@pytest.mark.slow
+def test_a_day_without_drift(filter_q, data_dir, pytestconfig):
+    """A day at 100 Hz with --full, three hours otherwise; overflow would end the process."""
+    samples, _ = resampled("broad:16")
+    rounds = (8_640_000 if pytestconfig.getoption("--full") else 1_000_000) // len(samples) + 1
+    last, length = filter_q.soak(samples, rounds)
+    np.testing.assert_allclose(length, 1.0, atol=5e-5)
+    for part in ("p", "c", "b"):
+        later, first = (last["channel"][part][k].astype(float) for k in (-1, 1))
+        np.testing.assert_allclose(later, first, rtol=0.01, err_msg="the covariance has settled")
+    np.testing.assert_allclose(biases(last)[-1], biases(last)[1], atol=1e-5)
+
+
 def test_any_state_sample_and_number_of_periods(filter_q, rng):
     """Bits of any kind: nothing overflows (the library traps it)."""
     count = 20_000

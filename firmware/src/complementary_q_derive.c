@@ -1,0 +1,1 @@
+#include "../core/complementary_q_derive.c"

@@ -1,0 +1,1 @@
+#include "../core/tilt_q.c"
