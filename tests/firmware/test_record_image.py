@@ -1,4 +1,4 @@
-"""`factorlab record serial` on the images for the boards, run in real time behind a pseudo-terminal."""
+"""`factorlab record serial` on the image for the ATmega328P, run in real time behind a pseudo-terminal."""
 
 import json
 from dataclasses import replace
@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from factorlab.cli import main
 from factorlab.firmware.avr import emulate_avr, live_avr
 from factorlab.firmware.emulation import mpu6050_counts
-from factorlab.firmware.m4 import live_m4
 from sequential.readers import read_imu
 from sequential.sensors import simulate_imu, tumble
 from sequential.sensors.calibration_header import c_header, calibration_hash, nominal_calibration
@@ -31,16 +30,6 @@ def live(avr_image, avr_simulator):
 
     def run(filter_, counts):
         return live_avr(avr_image(FILTER=filter_), counts, simulator=avr_simulator)
-
-    return run
-
-
-@pytest.fixture
-def live_on_m4(m4_image, qemu):
-    """The Cortex-M4F with a filter."""
-
-    def run(filter_, counts):
-        return live_m4(m4_image(FILTER=filter_, CLOCK="systick"), counts)
 
     return run
 
@@ -73,13 +62,6 @@ def test_raw_samples_are_those_of_the_sensor(live, counts, tmp_path):
     path = tmp_path / "imu.csv"
     told = recorded(live("none", counts), path)
     assert (told["board"]["target"], told["board"]["filter"]) == ("atmega328p", "none")
-    assert_samples(path, counts)
-
-
-def test_raw_samples_of_the_other_board(live_on_m4, counts, tmp_path):
-    path = tmp_path / "imu.csv"
-    told = recorded(live_on_m4("mahony_f32", counts), path)
-    assert (told["board"]["target"], told["board"]["filter"]) == ("mps2-an386", "mahony_f32")
     assert_samples(path, counts)
 
 
