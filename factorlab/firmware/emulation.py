@@ -29,7 +29,7 @@ GRAVITY = 9.80665  # m/s², the g of data sheets
 RATE = 100.0
 PERIOD_US = 10_000
 COMMANDS = {"q": "quaternion", "a": "angles", "r": "raw", "t": "text"}
-PAUSE = 1e-3  # s without a byte on the line: a frame has ended
+PAUSE = 1e-3  # s without a byte on the line
 TWO_FRAMES = 48  # bytes: the least that two of them take
 
 
@@ -189,16 +189,13 @@ def frames_of_samples(
 def _located(decoder: SerialDecoder, data: bytes, byte_s: Floats) -> Iterator[tuple[int, Frame]]:
     """Give each frame with the place of its first byte.
 
-    Frames are apart on the line: what stands alone between two pauses and is too short for two of them goes
-    into the decoder whole, anything else byte by byte.
+    Frames are apart on the line, so the bytes go in by what stands between two pauses, or one by one where
+    that is long enough to hold two frames: the last byte of what goes in is then the last of a frame.
     """
     edges = [0, *(np.flatnonzero(np.diff(byte_s) > PAUSE) + 1).tolist(), len(data)]
     for begin, end in itertools.pairwise(edges):
-        if end - begin < TWO_FRAMES:
-            for frame in decoder.feed(data[begin:end]):
-                yield begin, frame
-            continue
-        for k in range(begin, end):
-            for frame in decoder.feed(data[k : k + 1]):
+        pieces = [(begin, end)] if end - begin < TWO_FRAMES else [(k, k + 1) for k in range(begin, end)]
+        for first, last in pieces:
+            for frame in decoder.feed(data[first:last]):
                 text = isinstance(frame, AngleFrame) and frame.status is None
-                yield data.rfind(b"$", 0, k) if text else k + 1 - len(encode(frame)), frame
+                yield data.rfind(b"$", 0, last) if text else last - len(encode(frame)), frame

@@ -1,8 +1,8 @@
 /* The application that every board runs: sensor to filter to serial line, 100 times a second.
  *
  * Each period: the burst of the sensor, the update of the filter, one frame.  The frame's first byte is
- * handed to the board when what the frame says has been computed, the rest is encoded while that byte is on
- * its way.  A period without a sample has its frame too, with the last attitude and FRAME_SAMPLE_MISSING; the
+ * handed to the board when the attitude (or its angles, where the frame has those) has been computed, the
+ * rest is encoded while that byte is on its way.  A period without a sample has its frame too, with the last attitude and FRAME_SAMPLE_MISSING; the
  * filter is told how many periods passed when samples come again.  A boot frame comes first, and whenever `b`
  * is received.
  *

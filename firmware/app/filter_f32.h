@@ -4,6 +4,8 @@
  * and ATTITUDE its functions of these names for a board without magnetometer; it adds `filter_bias` and
  * `filter_status`.
  */
+#include <string.h>
+
 #include "../core/frame.h"
 #include "filter.h"
 #include "sample.h"
@@ -18,6 +20,7 @@ const uint32_t filter_calibration_hash = FACTORLAB_CALIBRATION_HASH;
 static struct OF(_derived) derived;
 static struct OF(_state) state;
 static struct imu_f32 sample;
+static int32_t attitude[4]; /* world_q_body, Q30 */
 static uint8_t started; /* 1: a first sample has come */
 
 void filter_start(void)
@@ -26,6 +29,7 @@ void filter_start(void)
     OF(_defaults)(&settings);
     OF(_derive)(&settings, &derived);
     started = 0;
+    quaternion_identity(attitude);
 }
 
 void filter_accel(const int16_t accel[3])
@@ -35,6 +39,7 @@ void filter_accel(const int16_t accel[3])
 
 void filter_update(const int16_t gyro[3], uint8_t periods)
 {
+    float estimate[4];
     sample_gyro_f32(gyro, &sample);
     if (started == 0U) {
         started = 1;
@@ -42,15 +47,11 @@ void filter_update(const int16_t gyro[3], uint8_t periods)
         OF(_start)(&state, &derived, &sample);
     }
     STEP(&state, &derived, &sample, (float)periods * SAMPLE_PERIOD_S);
+    ATTITUDE(&state, estimate);
+    quaternion_of(estimate, attitude);
 }
 
 void filter_attitude(int32_t world_q_body[4])
 {
-    float attitude[4];
-    if (started == 0U) {
-        quaternion_identity(world_q_body);
-        return;
-    }
-    ATTITUDE(&state, attitude);
-    quaternion_of(attitude, world_q_body);
+    (void)memcpy(world_q_body, attitude, sizeof attitude);
 }

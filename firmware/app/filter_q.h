@@ -4,6 +4,8 @@
  * The file that includes this says which one it is: MODULE its name, KIND its number in a boot frame; it adds
  * `filter_bias` and `filter_status`.
  */
+#include <string.h>
+
 #include "../core/frame.h"
 #include "filter.h"
 #include "sample.h"
@@ -18,11 +20,13 @@ const uint32_t filter_calibration_hash = FACTORLAB_CALIBRATION_HASH;
 
 static struct OF(_state) state;
 static struct imu_q sample;
+static int32_t attitude[4]; /* world_q_body, Q30 */
 static uint8_t started; /* 1: a first sample has come */
 
 void filter_start(void)
 {
     started = 0;
+    quaternion_identity(attitude);
 }
 
 void filter_accel(const int16_t accel[3])
@@ -39,13 +43,10 @@ void filter_update(const int16_t gyro[3], uint8_t periods)
         OF(_start)(&state, &DERIVED, &sample);
     }
     OF(_step)(&state, &DERIVED, &sample, periods);
+    OF(_attitude)(&state, attitude);
 }
 
 void filter_attitude(int32_t world_q_body[4])
 {
-    if (started == 0U) {
-        quaternion_identity(world_q_body);
-    } else {
-        OF(_attitude)(&state, world_q_body);
-    }
+    (void)memcpy(world_q_body, attitude, sizeof attitude);
 }

@@ -65,7 +65,7 @@ void mpu6050_start(struct mpu6050 *sensor);
 /* To be called when a period begins: starts its transfer.  MPU6050_PENDING or MPU6050_NOTHING. */
 uint8_t mpu6050_tick(struct mpu6050 *sensor);
 
-/* May be called when BOARD_PART bytes have been read; 1: `counts` has the accelerometer's three. */
+/* May be called when BOARD_PART bytes have been read; 1: `counts` has the accelerometer. */
 uint8_t mpu6050_part(struct mpu6050 *sensor);
 
 /* To be called when a transfer has ended. */

@@ -192,3 +192,18 @@ def test_every_filter_fits_and_runs(avr_image, avr_simulator, rng, name):
 def test_filter_that_is_none_is_named(avr_image):
     with pytest.raises(ToolMissingError, match=r"no filter 'mahoni_q': FILTER is one of .*mahony_q"):
         avr_image(FILTER="mahoni_q")
+
+
+def test_flash_writes_the_image_with_avrdude(avr_toolchain, firmware_dir, tmp_path):
+    words = ["make", "-n", "-C", str(firmware_dir / "ports" / "avr"), "flash", f"OUT={tmp_path}"]
+    said = run_tool([*words, "PORT=/dev/ttyUSB7"])
+    command = next(line for line in said.splitlines() if line.startswith("avrdude"))
+    assert "-p atmega328p" in command
+    assert "-P /dev/ttyUSB7" in command
+    assert f"flash:w:{tmp_path}/firmware.hex:i" in command
+
+
+def test_simulator_is_clean(c_compiler, simavr, firmware_dir, tmp_path):
+    for source in sorted((firmware_dir / "ports" / "avr" / "simulator").glob("*.c")):
+        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror"]
+        run_tool([c_compiler, *flags, "-c", str(source), "-o", str(tmp_path / "object.o")])
