@@ -5,7 +5,6 @@
 
 #define DEGREE 0.017453292519943295f /* rad */
 #define FASTEST 1000.0f              /* rad/s: no gyro reads more */
-#define LONGEST_PAUSE 10.0f          /* s: a longer one leaves nothing known either */
 #define SETTINGS 39                  /* how many there are, ... */
 #define FIRST_SQUARED 16             /* ... of which these and the following are squared */
 
@@ -93,7 +92,7 @@ static void level(float turn[4], const float accel[3])
 SELDOM_F32
 static void open_block(struct error_state_f32_state *s)
 {
-    memset(&s->sums, 0, sizeof s->sums);
+    error_state_f32_fill((float *)&s->sums, (int)(sizeof s->sums / sizeof(float)), 0.0f);
     memcpy(s->begin, s->turn, sizeof s->begin);
     s->closing = 0;
 }
@@ -125,7 +124,7 @@ static void finish_block(struct error_state_f32_state *s, const struct error_sta
     if (s->resting) {
         error_state_f32_rest_bias(s, d);
     }
-    if (s->sums.fields > 0) {
+    if (s->sums.fields > 0.0f) {
         error_state_f32_use_field(s, d);
     }
     open_block(s);
@@ -135,11 +134,11 @@ static void finish_block(struct error_state_f32_state *s, const struct error_sta
 SELDOM_F32
 static void close_block(struct error_state_f32_state *s, const struct error_state_f32_derived *d)
 {
-    const float per_force = s->sums.forces > 0 ? 1.0f / (float)s->sums.forces : 1.0f;
+    const float per_force = s->sums.forces > 0.0f ? 1.0f / s->sums.forces : 1.0f;
     const struct vector_f32 mean = scaled_f32(load_vector_f32(s->sums.force), per_force);
     const float force[2] = {mean.x, mean.y}, drift = error_state_f32_predict_tilt(s, d, mean.z);
     error_state_f32_watch_rest(s, d, per_force);
-    if (s->sums.forces == 0) {
+    if (!(s->sums.forces > 0.0f)) {
         error_state_f32_widen_tilt(s, d, 0.0f, 0.0f);
     } else if (s->sums.elapsed > 0.0f && !error_state_f32_overturned(s, d, per_force)) {
         error_state_f32_correct_tilt(s, d, force);
@@ -148,7 +147,7 @@ static void close_block(struct error_state_f32_state *s, const struct error_stat
         error_state_f32_drift_heading(s, d, drift);
     }
     s->closing = 1;
-    if (s->sums.fields > 0 && error_state_f32_heading_unsure(s, d)) {
+    if (s->sums.fields > 0.0f && error_state_f32_heading_unsure(s, d)) {
         finish_block(s, d);
     }
 }
@@ -159,7 +158,7 @@ static void jump(struct error_state_f32_state *s, const struct error_state_f32_d
                  const float accel[3], float dt)
 {
     const float turned = smaller_f32(0.25f * dt * dt, 10.0f);
-    if (s->sums.samples > 0) {
+    if (s->sums.samples > 0.0f) {
         close_block(s, d);
     }
     if (s->closing) {
@@ -190,7 +189,7 @@ void error_state_f32_step(struct error_state_f32_state *s, const struct error_st
     }
     s->unread = !(dot_f32(rate, rate) < FASTEST * FASTEST);
     if (s->unread) {
-        s->pending = smaller_f32(since, LONGEST_PAUSE);
+        s->pending = since;
         return;
     }
     s->pending = 0.0f;
@@ -203,12 +202,10 @@ void error_state_f32_step(struct error_state_f32_state *s, const struct error_st
         since = 0.0f;
     }
     error_state_f32_gather(s, sample, since);
-    if (!s->heading_known && s->sums.fields > 0) {
+    if (!s->heading_known && s->sums.fields > 0.0f) {
         error_state_f32_use_field(s, d);
     }
     if (s->sums.elapsed >= d->block) {
         close_block(s, d);
-    } else if (s->sums.samples == UINT16_MAX) {
-        open_block(s);
     }
 }

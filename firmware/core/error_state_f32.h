@@ -32,7 +32,7 @@
  *   force from below for 0.5 s    levelled anew
  *   gap > `gap`                   the block ends; may have turned by half a radian a second, any way; levelled
  *                                 by the first force after a long one (0.4 s by default)
- *   dt NaN or negative            taken as 0; 65 535 samples without time empty the sums
+ *   dt NaN or negative            taken as 0; samples without time go into the same means
  *   magnetometer NaN, zero        not in the mean; without any the heading's variance grows
  *   field that repeats bit for bit   no news: a stuck magnetometer is the same as none
  *   field vertical                no heading at the start (0 is taken), little correction after
@@ -135,7 +135,7 @@ struct error_state_f32_derived {
     float stiffness;         /* 1/s^2, a^2 */
 };
 
-/* What a block gathers; "turned" is in the frame of the gyro, whose z is up. */
+/* What a block gathers, floats only; "turned" is in the frame of the gyro, whose z is up. */
 struct error_state_f32_sums {
     float force[3];     /* m/s^2, turned */
     float field[3];     /* the magnetometer's unit, turned */
@@ -144,9 +144,9 @@ struct error_state_f32_sums {
     float specific[3];  /* m/s^2, as read */
     float rate_squared; /* rad^2/s^2, without bias */
     float elapsed;      /* s */
-    uint16_t samples;   /* 1 */
-    uint16_t forces;    /* 1, samples with a usable force */
-    uint16_t fields;    /* 1, samples with a new field */
+    float samples;      /* 1 */
+    float forces;       /* 1, samples with a usable force */
+    float fields;       /* 1, samples with a new field */
 };
 
 struct error_state_f32_state {

@@ -66,17 +66,17 @@ void error_state_f32_gather(struct error_state_f32_state *restrict s, const stru
     for (i = 0; i < 9; i++) {
         sums->turned[i] += matrix[i];
     }
-    sums->samples++;
+    sums->samples += 1.0f;
     sums->elapsed += dt;
     if (reads(sample->accel, FORCE_SPAN)) {
         error_state_f32_add_turned(sums->force, matrix, sample->accel);
         for (i = 0; i < 3; i++) {
             sums->specific[i] += sample->accel[i];
         }
-        sums->forces++;
+        sums->forces += 1.0f;
     }
     if (reads(sample->mag, FIELD_SPAN) && is_news(s->last_field, sample->mag)) {
         error_state_f32_add_turned(sums->field, matrix, sample->mag);
-        sums->fields++;
+        sums->fields += 1.0f;
     }
 }

@@ -19,15 +19,6 @@ static void turn_heading(float half[2], float angle)
     error_state_f32_normalise(half, 2);
 }
 
-/* Make the hard iron less sure. */
-ONCE_F32 SELDOM_F32
-static void add_iron(float *p, float variance)
-{
-    p[LOWER(3, 3)] += variance;
-    p[LOWER(4, 4)] += variance;
-    p[LOWER(5, 5)] += variance;
-}
-
 /* Take the heading, and as long as the inclination is unsure the reference too, from a field. */
 SELDOM_F32
 static void begin_heading(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
@@ -41,7 +32,7 @@ static void begin_heading(struct error_state_f32_state *s, const struct error_st
         error_state_f32_fill(p, LOWER(7, 0), 0.0f);
         error_state_f32_fill(s->heading, 6, 0.0f);
         s->heading[6] = d->delay;
-        add_iron(p, d->iron_prior);
+        error_state_f32_widen(p, 3, 3, d->iron_prior);
         p[LOWER(6, 6)] = d->delay_prior;
     }
     if (!s->heading_known || tilt > d->tilt_known) {
@@ -51,10 +42,11 @@ static void begin_heading(struct error_state_f32_state *s, const struct error_st
         p[LOWER(2, 2)] = d->reference_prior;
     }
     s->heading_known = 1;
-    for (i = 1; i < 7; i++) {
-        p[LOWER(i, 0)] = 0.0f;
-    }
     p[0] = d->heading_prior + tilt * (up < 100.0f * across ? up / across : 100.0f);
+    for (i = 1; i < 7; i++) {
+        p += i;
+        *p = 0.0f;
+    }
     error_state_f32_half_angle(field[1], field[0], s->half);
     s->unseen = 0.0f;
 }
@@ -65,11 +57,9 @@ void error_state_f32_drift_heading(struct error_state_f32_state *s, const struct
                                    float variance)
 {
     const float dt = s->sums.elapsed;
-    float *p = s->heading_cov;
-    p[0] += variance;
-    p[LOWER(1, 1)] += d->reference_walk * dt;
-    p[LOWER(2, 2)] += d->reference_walk * dt;
-    add_iron(p, d->iron_walk * dt);
+    s->heading_cov[0] += variance;
+    error_state_f32_widen(s->heading_cov, 1, 2, d->reference_walk * dt);
+    error_state_f32_widen(s->heading_cov, 3, 3, d->iron_walk * dt);
     s->unseen = smaller_f32(s->unseen + dt, LONGEST_UNSEEN);
 }
 
@@ -95,7 +85,7 @@ static void look(const struct error_state_f32_state *s, const float field[3],
                  struct error_state_f32_reading readings[3], float found[3])
 {
     const float c = s->half[0] * s->half[0] - s->half[1] * s->half[1], d = 2.0f * s->half[0] * s->half[1];
-    const float inverse = 1.0f / (float)s->sums.samples, *r = s->sums.turned;
+    const float inverse = 1.0f / s->sums.samples, *r = s->sums.turned;
     const struct vector_f32 w = mean_rate(s), m = scaled_f32(load_vector_f32(field), s->per_length);
     const struct vector_f32 rate = vector_f32(c * w.x - d * w.y, d * w.x + c * w.y, w.z);
     const struct vector_f32 north = vector_f32(c * m.x - d * m.y, d * m.x + c * m.y, m.z);
@@ -110,6 +100,7 @@ static void look(const struct error_state_f32_state *s, const float field[3],
     }
     for (i = 0; i < 3; i++) {
         static const uint8_t errors[4] = {3, 4, 5, 6};
+        error_state_f32_fill(readings[i].gain + 7, 3, 0.0f); /* which are loaded, and not used */
         readings[i].terms = 5;
         readings[i].error[0] = (uint8_t)i;
         memcpy(readings[i].error + 1, errors, sizeof errors);
@@ -146,7 +137,7 @@ static void correct_heading(struct error_state_f32_state *s, const struct error_
     excess = beyond(s, d, readings, found, tilt);
     noise = d->field_noise / larger_f32(s->unseen, d->block) + 0.5f * tilt + d->field_doubt * excess;
     s->disturbed = excess > 0.0f;
-    add_iron(p, excess * d->iron_doubt * s->unseen);
+    error_state_f32_widen(p, 3, 3, excess * d->iron_doubt * s->unseen);
     for (i = 0; i < 3; i++) {
         error_state_f32_read(s->heading, p, 7, &readings[i], found[i], noise);
     }
@@ -169,7 +160,7 @@ SELDOM_F32
 void error_state_f32_use_field(struct error_state_f32_state *s, const struct error_state_f32_derived *d)
 {
     const float tilt = s->tilt_cov[LOWER(0, 0)] + s->tilt_cov[LOWER(1, 1)];
-    const struct vector_f32 mean = scaled_f32(load_vector_f32(s->sums.field), 1.0f / (float)s->sums.fields);
+    const struct vector_f32 mean = scaled_f32(load_vector_f32(s->sums.field), 1.0f / s->sums.fields);
     float field[3];
     store_vector_f32(field, mean);
     if (!usable_f32(dot_f32(mean, mean))) {

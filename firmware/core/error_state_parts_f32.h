@@ -18,9 +18,11 @@ extern "C" {
 #if defined(__GNUC__)
 #define SELDOM_F32 __attribute__((cold))
 #define ONCE_F32 __attribute__((noinline))
+#define OFTEN_F32 __attribute__((noinline, hot))
 #else
 #define SELDOM_F32
 #define ONCE_F32
+#define OFTEN_F32
 #endif
 
 /* Place of row i, column j <= i in a packed lower triangle. */
@@ -44,11 +46,12 @@ struct error_state_f32_reading {
     uint8_t terms;    /* 1, how many */
 };
 
-/* reading: H times values; read corrects values and covariance and gives the innovation; move adds H x to error
+/* reading: add to variances; H times values; read corrects values and covariance and gives the innovation; move adds H x to error
  * k in the covariance and gives H P H'. */
 float error_state_f32_along(const struct error_state_f32_reading *reading, const float *values);
 float error_state_f32_read(float *values, float *cov, int n, struct error_state_f32_reading *reading,
                            float found, float noise);
+void error_state_f32_widen(float *cov, int first, int count, float variance);
 float error_state_f32_move(float *cov, int n, int k, struct error_state_f32_reading *by);
 
 /* turning: out = p q, which may be one of both; to length 1; all to one value; rotation matrix, row by row; sum += m v; by the

@@ -25,7 +25,7 @@ void error_state_f32_watch_rest(struct error_state_f32_state *s, const struct er
     const struct error_state_f32_sums *sums = &s->sums;
     const uint32_t most = bound_f32(d->rest_rate);
     const float share = s->watching ? smaller_f32(1.0f, sums->elapsed * d->rest_share) : 1.0f;
-    const float rate = follow(s->slow_rate, sums->rate, 1.0f / (float)sums->samples, share);
+    const float rate = follow(s->slow_rate, sums->rate, 1.0f / sums->samples, share);
     const float force = follow(s->slow_force, sums->specific, per_force, share);
     const int near = (rate <= d->rest_rate_change && force <= d->rest_force_change) || !s->watching;
     int i, slow = 1;

@@ -25,7 +25,7 @@ static void set_axis(struct error_state_f32_reading *axis, int i, float tilt, fl
 SELDOM_F32
 static float predict(struct error_state_f32_state *s, float push)
 {
-    const float dt = s->sums.elapsed, turned = -dt / (float)s->sums.samples;
+    const float dt = s->sums.elapsed, turned = -dt / s->sums.samples;
     struct error_state_f32_reading moved;
     float about = 0.0f;
     int i, j;
@@ -49,17 +49,13 @@ SELDOM_F32
 float error_state_f32_predict_tilt(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                                    float fz)
 {
-    const float dt = s->sums.elapsed, rate_squared = s->sums.rate_squared / (float)s->sums.samples;
+    const float dt = s->sums.elapsed, rate_squared = s->sums.rate_squared / s->sums.samples;
     const float across = dt * (d->gyro_noise + d->tilt_scale * rate_squared);
     const float about = dt * (d->gyro_noise + d->heading_scale * rate_squared);
     const float by_bias = predict(s, fz * dt);
-    float *p = s->tilt_cov;
-    p[LOWER(0, 0)] += across;
-    p[LOWER(1, 1)] += across;
-    p[LOWER(2, 2)] += about;
-    p[LOWER(3, 3)] += d->bias_walk * dt;
-    p[LOWER(4, 4)] += d->bias_walk * dt;
-    p[LOWER(5, 5)] += d->bias_walk * dt;
+    error_state_f32_widen(s->tilt_cov, 0, 2, across);
+    error_state_f32_widen(s->tilt_cov, 2, 1, about);
+    error_state_f32_widen(s->tilt_cov, 3, 3, d->bias_walk * dt);
     return about + (dt > 0.0f ? d->bias_memory * by_bias / dt : 0.0f);
 }
 
@@ -116,7 +112,7 @@ void error_state_f32_rest_bias(struct error_state_f32_state *s, const struct err
     axis.weight[0] = 1.0f;
     for (i = 0; i < 3; i++) {
         axis.error[0] = (uint8_t)(3 + i);
-        read(s, &axis, s->sums.rate[i] / (float)s->sums.samples, d->rest_noise / s->sums.elapsed);
+        read(s, &axis, s->sums.rate[i] / s->sums.samples, d->rest_noise / s->sums.elapsed);
     }
     lean(s);
 }
@@ -135,8 +131,7 @@ void error_state_f32_widen_tilt(struct error_state_f32_state *s, const struct er
     p[LOWER(7, 7)] = d->velocity_prior;
     p[LOWER(8, 8)] = d->position_prior;
     p[LOWER(9, 9)] = d->position_prior;
-    p[LOWER(0, 0)] += tilt;
-    p[LOWER(1, 1)] += tilt;
+    error_state_f32_widen(p, 0, 2, tilt);
     p[LOWER(2, 2)] += heading;
     if (p[LOWER(0, 0)] > UNKNOWN_TILT || p[LOWER(1, 1)] > UNKNOWN_TILT) {
         for (i = 1; i < 6; i++) {
