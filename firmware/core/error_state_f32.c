@@ -8,7 +8,7 @@
 #define SETTINGS 39                  /* how many there are, ... */
 #define FIRST_SQUARED 16             /* ... of which these and the following are squared */
 
-typedef char settings_are_floats[sizeof(struct error_state_f32_settings) == SETTINGS * sizeof(float) ? 1 : -1];
+typedef char as_many_floats[sizeof(struct error_state_f32_settings) == SETTINGS * sizeof(float) ? 1 : -1];
 
 SELDOM_F32
 void error_state_f32_defaults(struct error_state_f32_settings *settings)
@@ -124,7 +124,7 @@ static void finish_block(struct error_state_f32_state *s, const struct error_sta
     if (s->resting) {
         error_state_f32_rest_bias(s, d);
     }
-    if (s->sums.fields > 0.0f) {
+    if (any_f32(s->sums.fields)) {
         error_state_f32_use_field(s, d);
     }
     open_block(s);
@@ -134,11 +134,11 @@ static void finish_block(struct error_state_f32_state *s, const struct error_sta
 SELDOM_F32
 static void close_block(struct error_state_f32_state *s, const struct error_state_f32_derived *d)
 {
-    const float per_force = s->sums.forces > 0.0f ? 1.0f / s->sums.forces : 1.0f;
+    const float per_force = any_f32(s->sums.forces) ? 1.0f / s->sums.forces : 1.0f;
     const struct vector_f32 mean = scaled_f32(load_vector_f32(s->sums.force), per_force);
     const float force[2] = {mean.x, mean.y}, drift = error_state_f32_predict_tilt(s, d, mean.z);
     error_state_f32_watch_rest(s, d, per_force);
-    if (!(s->sums.forces > 0.0f)) {
+    if (!any_f32(s->sums.forces)) {
         error_state_f32_widen_tilt(s, d, 0.0f, 0.0f);
     } else if (s->sums.elapsed > 0.0f && !error_state_f32_overturned(s, d, per_force)) {
         error_state_f32_correct_tilt(s, d, force);
@@ -147,7 +147,7 @@ static void close_block(struct error_state_f32_state *s, const struct error_stat
         error_state_f32_drift_heading(s, d, drift);
     }
     s->closing = 1;
-    if (s->sums.fields > 0.0f && error_state_f32_heading_unsure(s, d)) {
+    if (any_f32(s->sums.fields) && error_state_f32_heading_unsure(s, d)) {
         finish_block(s, d);
     }
 }
@@ -158,7 +158,7 @@ static void jump(struct error_state_f32_state *s, const struct error_state_f32_d
                  const float accel[3], float dt)
 {
     const float turned = smaller_f32(0.25f * dt * dt, 10.0f);
-    if (s->sums.samples > 0.0f) {
+    if (any_f32(s->sums.samples)) {
         close_block(s, d);
     }
     if (s->closing) {
@@ -202,7 +202,7 @@ void error_state_f32_step(struct error_state_f32_state *s, const struct error_st
         since = 0.0f;
     }
     error_state_f32_gather(s, sample, since);
-    if (!s->heading_known && s->sums.fields > 0.0f) {
+    if (!s->heading_known && any_f32(s->sums.fields)) {
         error_state_f32_use_field(s, d);
     }
     if (s->sums.elapsed >= d->block) {

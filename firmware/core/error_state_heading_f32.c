@@ -100,7 +100,9 @@ static void look(const struct error_state_f32_state *s, const float field[3],
     }
     for (i = 0; i < 3; i++) {
         static const uint8_t errors[4] = {3, 4, 5, 6};
-        error_state_f32_fill(readings[i].gain + 7, 3, 0.0f); /* which are loaded, and not used */
+        readings[i].gain[7] = 0.0f; /* these are loaded, and not used */
+        readings[i].gain[8] = 0.0f;
+        readings[i].gain[9] = 0.0f;
         readings[i].terms = 5;
         readings[i].error[0] = (uint8_t)i;
         memcpy(readings[i].error + 1, errors, sizeof errors);
@@ -123,7 +125,8 @@ static float beyond(const struct error_state_f32_state *s, const struct error_st
     }
     off[1] += north;
     across = sqrtf(off[0] * off[0] + off[1] * off[1]) - north;
-    return larger_f32(0.0f, across * across + off[2] * off[2] - p[LOWER(1, 1)] - p[LOWER(2, 2)] - tilt - d->field_gate);
+    across = across * across + off[2] * off[2];
+    return larger_f32(0.0f, across - p[LOWER(1, 1)] - p[LOWER(2, 2)] - tilt - d->field_gate);
 }
 
 SELDOM_F32

@@ -2,7 +2,8 @@
  *
  * One file each: error_state_f32.c (settings, start, the order of a step), error_state_gather_f32.c (a sample
  * into the sums), error_state_tilt_f32.c, error_state_rest_f32.c and error_state_heading_f32.c (what a block
- * corrects), error_state_report_f32.c (what is told).  See error_state_f32.h.
+ * corrects), error_state_reading_f32.c and error_state_turning_f32.c (covariances, quaternions),
+ * error_state_report_f32.c (what is told).  Source, cost and bad input: error_state_f32.h.
  */
 #ifndef FACTORLAB_ERROR_STATE_PARTS_F32_H
 #define FACTORLAB_ERROR_STATE_PARTS_F32_H
@@ -28,6 +29,12 @@ extern "C" {
 /* Place of row i, column j <= i in a packed lower triangle. */
 #define LOWER(i, j) ((i) * ((i) + 1) / 2 + (j))
 
+/* Whether a count, or another number that is not negative, is above zero. */
+INLINE_F32 int any_f32(float count)
+{
+    return bits_f32(count) != 0;
+}
+
 INLINE_F32 float larger_f32(float a, float b)
 {
     return a > b ? a : b;
@@ -46,16 +53,25 @@ struct error_state_f32_reading {
     uint8_t terms;    /* 1, how many */
 };
 
-/* reading: add to variances; H times values; read corrects values and covariance and gives the innovation; move adds H x to error
- * k in the covariance and gives H P H'. */
+/* reading
+ *   widen    add to variances
+ *   along    H times values
+ *   read     correct values and covariance; gives the innovation
+ *   move     add H x to error k in the covariance; gives H P H' */
+void error_state_f32_widen(float *cov, int first, int count, float variance);
 float error_state_f32_along(const struct error_state_f32_reading *reading, const float *values);
 float error_state_f32_read(float *values, float *cov, int n, struct error_state_f32_reading *reading,
                            float found, float noise);
-void error_state_f32_widen(float *cov, int first, int count, float variance);
 float error_state_f32_move(float *cov, int n, int k, struct error_state_f32_reading *by);
 
-/* turning: out = p q, which may be one of both; to length 1; all to one value; rotation matrix, row by row; sum += m v; by the
- * quaternion (c, x, y, 0) in the frame of the gyro, normalised. */
+/* turning
+ *   multiply     out = p q, which may be one of both
+ *   normalise    to length 1
+ *   fill         all to one value
+ *   rotation     matrix of a quaternion, row by row
+ *   add_turned   sum += m v
+ *   lean         by the quaternion (c, x, y, 0) in the frame of the gyro, normalised
+ *   lean_upright by the shortest way such that a force in the frame of the gyro points up */
 void error_state_f32_multiply(const float p[4], const float q[4], float out[4]);
 void error_state_f32_normalise(float *values, int n);
 void error_state_f32_fill(float *values, int n, float value);
@@ -64,15 +80,14 @@ void error_state_f32_add_turned(float sum[3], const float m[9], const float v[3]
 void error_state_f32_lean(float turn[4], float c, float x, float y);
 void error_state_f32_lean_upright(float turn[4], const float force[3]);
 
-/* start: level by the accelerometer; cosine and sine of half of the angle of (x, y). */
 void error_state_f32_half_angle(float x, float y, float half[2]);
 
 /* gather: turn by one sample and add its force and field, in the frame of the gyro, to the sums. */
 void error_state_f32_gather(struct error_state_f32_state *s, const struct imu_f32 *sample, float dt);
 int error_state_f32_force_usable(const float force[3]);
 
-/* tilt: predict, correct by the mean force and by the gyro at rest; forget velocity and position.  Predict gives
- * by how much the heading has become less sure, rad^2. */
+/* tilt: predict, correct by the mean force and by the gyro at rest; forget velocity and position.  Predict
+ * gives by how much the heading has become less sure, rad^2. */
 float error_state_f32_predict_tilt(struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                                    float fz);
 void error_state_f32_correct_tilt(struct error_state_f32_state *s, const struct error_state_f32_derived *d,

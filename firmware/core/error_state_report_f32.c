@@ -4,12 +4,13 @@
 /* Rate without bias; zero where the gyro was not read. */
 INLINE_F32 struct vector_f32 present_rate(const struct error_state_f32_state *s)
 {
-    const struct vector_f32 rate = minus_f32(load_vector_f32(s->last_rate), load_vector_f32(s->tilt + 3), 1.0f);
+    const struct vector_f32 bias = load_vector_f32(s->tilt + 3);
+    const struct vector_f32 rate = minus_f32(load_vector_f32(s->last_rate), bias, 1.0f);
     return s->unread ? vector_f32(0.0f, 0.0f, 0.0f) : rate;
 }
 
-/* The attitude of the gyro's frame at the time of the sample, whose reading is `latency` old, turned about the
- * vertical by the angle of which cosine and sine of the half are given; the one of both signs with w >= 0. */
+/* The attitude of the gyro's frame at the time of the sample, whose reading is `latency` old, turned about
+ * the vertical by the angle of which cosine and sine of the half are given; of both signs that of w >= 0. */
 ONCE_F32
 static void ahead(const struct error_state_f32_state *s, float c, float d, float out[4])
 {
@@ -39,7 +40,7 @@ void error_state_f32_attitude(const struct error_state_f32_state *s, float world
     ahead(s, s->half[0], s->half[1], world_q_body);
 }
 
-/* R' P R in the body frame for P in the frame of the gyro, and the rotation within the spread of the latency. */
+/* R' P R in the body frame for P in the frame of the gyro, and the rotation within the spread of latency. */
 static void into_body(const struct error_state_f32_state *s, const struct error_state_f32_derived *d,
                       const float frame[6], float cov[9])
 {

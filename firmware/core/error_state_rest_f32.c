@@ -1,4 +1,4 @@
-/* Rest, and a force that points far from up: what the error-state filter watches in the means of its blocks. */
+/* Rest, and a force far from up: what the error-state filter watches in the means of its blocks. */
 #include "error_state_parts_f32.h"
 
 #define SETTLED 1.0f /* s over which the mean force shows roughly where up is */

@@ -20,8 +20,9 @@ static void set_axis(struct error_state_f32_reading *axis, int i, float tilt, fl
     axis->weight[2] = position;
 }
 
-/* Covariance after p' = p + dt v + dt push / 2 (y, -x), v' = v + push (y, -x), and then theta' = theta - dt R b,
- * with R the mean rotation matrix.  Gives the variance that the bias adds to the rotation about up, rad^2. */
+/* Covariance after p' = p + dt v + dt push / 2 (y, -x), v' = v + push (y, -x), and then
+ * theta' = theta - dt R b, with R the mean rotation matrix.  Gives the variance that the bias adds to the
+ * rotation about up, rad^2. */
 SELDOM_F32
 static float predict(struct error_state_f32_state *s, float push)
 {
@@ -59,8 +60,8 @@ float error_state_f32_predict_tilt(struct error_state_f32_state *s, const struct
     return about + (dt > 0.0f ? d->bias_memory * by_bias / dt : 0.0f);
 }
 
-/* One reading of inclination, bias, velocity and position.  The rotation about the vertical is considered, not
- * corrected: it shares in what is known, and keeps its variance. */
+/* One reading of inclination, bias, velocity and position.  The rotation about the vertical is considered,
+ * not corrected: it shares in what is known, and keeps its variance. */
 ONCE_F32 SELDOM_F32
 static float read(struct error_state_f32_state *s, struct error_state_f32_reading *reading, float found,
                   float noise)

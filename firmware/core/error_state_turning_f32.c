@@ -70,8 +70,7 @@ void error_state_f32_lean(float turn[4], float c, float x, float y)
     error_state_f32_normalise(turn, 4);
 }
 
-/* Turn by the shortest way such that a force in the frame of the gyro points up; one that points straight down
- * over any axis. */
+/* A force that points straight down is turned over any axis. */
 SELDOM_F32
 void error_state_f32_lean_upright(float turn[4], const float force[3])
 {
