@@ -44,7 +44,7 @@ def compiled(compiler, folder, *sources, text=""):
 def pointer(array):
     """To the numbers of an array that is contiguous."""
     assert array.flags.c_contiguous
-    return ctypes.c_void_p(array.ctypes.data)
+    return array.ctypes.data_as(ctypes.c_void_p)  # which keeps the array alive
 
 
 def samples_q(gyro, accel, mag=None):
