@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factorlab.firmware.avr import ABSENT, GOOD, HUNG, emulate_avr
+from factorlab.firmware.avr import ABSENT, GOOD, HUNG, RECORD, emulate_avr
 from factorlab.firmware.toolchain import run_tool
 from sequential.errors import DataError, ShapeError, ToolMissingError
 from sequential.readers.serial import Status
@@ -207,3 +207,19 @@ def test_simulator_is_clean(c_compiler, simavr, firmware_dir, tmp_path):
     for source in sorted((firmware_dir / "ports" / "avr" / "simulator").glob("*.c")):
         flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror"]
         run_tool([c_compiler, *flags, "-c", str(source), "-o", str(tmp_path / "object.o")])
+
+
+def test_bus_is_freed_by_nine_clocks_and_a_stop(avr_image, avr_simulator, counts, tmp_path):
+    """Philips UM10204, 3.1.16: whatever byte the sensor was in, it lets go of the data line by then."""
+    faults = np.zeros(len(counts), np.uint8)
+    faults[100] = HUNG
+    (tmp_path / "samples").write_bytes(counts.astype("<i2").tobytes())
+    (tmp_path / "faults").write_bytes(faults.tobytes())
+    files = [avr_image(FILTER="none"), tmp_path / "samples", tmp_path / "records"]
+    run_tool([str(avr_simulator), *map(str, files), "--faults", str(tmp_path / "faults")])
+    records = np.fromfile(tmp_path / "records", RECORD)
+    pulled = records["value"][records["kind"] == b"D"]
+    clock, data = 0x20, 0x10
+    clocks = [clock, 0] * 9
+    stop = [clock, clock | data, data, 0]
+    assert pulled.tolist() == clocks + stop

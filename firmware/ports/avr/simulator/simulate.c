@@ -3,7 +3,8 @@
  *     simulate IMAGE.elf SAMPLES RECORDS [--send BYTES] [--faults FILE] [--who-am-i N] [--real-time]
  *
  * SAMPLES: int16 little endian, rows ax ay az temperature gx gy gz, 100 a second, served as by an MPU-6050.
- * RECORDS: a `struct record` for each byte on the serial line, edge of the marker pins, and row served.
+ * RECORDS: a `struct record` for each byte on the serial line, edge of the marker pins, row served, and
+ *     change of what the program itself pulls low on the bus.
  * --send: bytes that the board receives once it has said something.
  * --faults: one byte a row (slave.h).
  * --real-time: no faster than a board; the serial line is a pseudo-terminal, whose name is printed first;
@@ -27,7 +28,7 @@
 #define START_PERIODS 50UL        /* by then a sensor that answers has been read */
 #define UNTOUCHED 0xC5            /* fills the RAM, so that the stack leaves a mark */
 
-enum { BYTE = 'B', SAMPLE_PIN = 'S', UPDATE_PIN = 'U', ROW = 'R' };
+enum { BYTE = 'B', SAMPLE_PIN = 'S', UPDATE_PIN = 'U', ROW = 'R', BUS_PINS = 'D' /* port C pulled low */ };
 
 struct record {
     uint64_t cycle;
@@ -93,12 +94,14 @@ static void silent(avr_t *which, const int level, const char *format, va_list ar
 
 static void watch(void)
 {
-    static const uint8_t sample = SAMPLE_PIN, update = UPDATE_PIN;
+    static const uint8_t sample = SAMPLE_PIN, update = UPDATE_PIN, bus = BUS_PINS;
     uint32_t flags = 0;
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags); /* nothing on the console */
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_byte, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 0), on_pin, (void *)&sample);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 1), on_pin, (void *)&update);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_DIRECTION_ALL),
+                            on_pin, (void *)&bus);
     avr->sleep = on_sleep;
 }
 
