@@ -15,7 +15,7 @@ from factorlab.firmware.toolchain import firmware_folder
 from factorlab.report.document import Cell, Table
 from sequential.sensors import ImuRecording
 
-__all__ = ["FILE", "ROWS", "Budget", "measure", "memory_table", "read_budget", "write_budget"]
+__all__ = ["FILE", "ROWS", "STEPS", "Budget", "measure", "memory_table", "read_budget", "write_budget"]
 
 FILE = "budget.csv"
 SAMPLES = 3000  # of the simulated minute, at 100 Hz
@@ -26,6 +26,9 @@ ROWS = (
     ("m4", "mahony_q", "6-D"), ("m4", "tilt_q", "6-D"), ("m4", "complementary_q", "6-D"),
     ("avr", "mahony_q", "6-D"), ("avr", "tilt_q", "6-D"), ("avr", "complementary_q", "6-D"),
 )  # fmt: skip
+
+
+STEPS = {("mahony_f32", "6-D"): "mahony_f32_step_6d"}  # where it is not `<module>_step`
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,8 @@ def measure(target: str, module: str, axes: str) -> Budget:
     from factorlab.firmware.sizes import module_sizes
 
     recording = _motion(axes)
-    sizes = module_sizes(module, target)
+    step = STEPS.get((module, axes))
+    sizes = module_sizes(module, target, step=step)
     if target == "avr":
         from factorlab.firmware.cycles import count_cycles
 
@@ -100,7 +104,7 @@ def measure(target: str, module: str, axes: str) -> Budget:
         from factorlab.firmware.instructions import count_instructions, imu_f32
 
         samples = imu_q(recording) if module.endswith("_q") else imu_f32(recording)
-        counted = count_instructions(module, samples)
+        counted = count_instructions(module, samples, step=step)
         stack, mean, worst = sizes.stack, counted.mean, counted.worst
     return Budget(target, module, axes, sizes.text, sizes.state, max(stack, sizes.stack), round(mean), worst)
 

@@ -34,7 +34,11 @@ void binding_mahony_f32_run(const double *settings, const struct recording *in, 
     mahony_f32_start(&state, &derived, &sample);
     for (int64_t k = 0; k < in->count; k++) {
         load_row_f32(&sample, in, k);
-        mahony_f32_step(&state, &derived, &sample, (float)interval(in, k));
+        if (in->mag == NULL) {
+            mahony_f32_step_6d(&state, &derived, &sample, (float)interval(in, k));
+        } else {
+            mahony_f32_step(&state, &derived, &sample, (float)interval(in, k));
+        }
         store_quaternion(out->world_q_body, k, state.world_q_body);
         store_row(out->bias, k, 3, state.gyro_bias);
         out->rest[k] = (uint8_t)mahony_f32_rests(&state, &derived);

@@ -1,9 +1,9 @@
 """The firmware against its bars: instructions, cycles, bytes, errors, frames, speed, a day of samples.
 
 `python firmware.py [--json] [--quick]`; --quick takes 20 000 samples where 100 000 are compared, and an hour
-for the day.  Needs FACTORLAB_DATA (BROAD), the cross compilers and the emulators.  The Cortex-M4's figures are
-instructions (QEMU), the AVR's are cycles (simavr); both run at 100 samples a second.  Ends with exit code 3
-when a must is missed.
+for the day.  Needs FACTORLAB_DATA (BROAD), the cross compilers and the emulators.  The figures of the
+Cortex-M4 are instructions (QEMU), those of the AVR cycles (simavr); both run at 100 samples a second.  Ends
+with exit code 3 when a must is missed.
 """
 
 from __future__ import annotations

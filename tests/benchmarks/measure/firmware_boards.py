@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from factorlab.firmware.avr import emulate_avr
+from factorlab.firmware.budget import STEPS
 from factorlab.firmware.build import build
 from factorlab.firmware.cycles import CycleCounts, count_cycles
 from factorlab.firmware.emulation import Emulation, mpu6050_counts
@@ -39,7 +40,8 @@ def instructions(module: str, recording: ImuRecording, *, magnetometer: bool) ->
     given = sampled(recording)
     given = given if magnetometer else replace(given, mag=None)
     samples = imu_q(given) if module.endswith("_q") else imu_f32(given)
-    return count_instructions(module, samples, rate=100.0)
+    step = STEPS.get((module, "9-D" if magnetometer else "6-D"))
+    return count_instructions(module, samples, rate=100.0, step=step)
 
 
 def avr_cycles(module: str, recording: ImuRecording) -> CycleCounts:
