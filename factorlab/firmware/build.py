@@ -116,9 +116,20 @@ def build(
 
 
 def constants_header(calibration: ImuCalibration, folder: Path) -> Path:
-    """Write the constants as C into a folder; the file."""
-    from sequential.sensors import c_header
+    """Write the constants as C into a folder; the file.
 
+    Raises
+    ------
+    DataError
+        where a sensor was calibrated in counts of another range than the driver sets.
+    """
+    from sequential.sensors import c_header, other_ranges
+
+    for kind, ratio in other_ranges(calibration).items():
+        raise DataError(
+            f"the {kind} was calibrated in counts of which one is {ratio:.3g} of the firmware's (MPU-6050 at "
+            "±8 g, ±2000 °/s): record with those ranges, or calibrate from a recording in SI units"
+        )
     path = folder / "calibration.h"
     path.write_text(c_header(calibration), encoding="utf-8")
     return path

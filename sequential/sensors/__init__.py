@@ -11,7 +11,12 @@
 from sequential.sensors.allan import AllanDeviation, allan_deviation
 from sequential.sensors.calibration import AffineCalibration, ImuCalibration
 from sequential.sensors.calibration_files import kalibr_yaml
-from sequential.sensors.calibration_header import c_header, calibration_hash, nominal_calibration
+from sequential.sensors.calibration_header import (
+    c_header,
+    calibration_hash,
+    nominal_calibration,
+    other_ranges,
+)
 from sequential.sensors.characterize import Characteristics, characterize
 from sequential.sensors.characterize_step import StepResponse, step_response
 from sequential.sensors.dwells import Dwells, find_dwells, join_recordings
@@ -88,6 +93,7 @@ __all__ = [
     "local_gravity",
     "missing_positions",
     "nominal_calibration",
+    "other_ranges",
     "simulate_imu",
     "stationary",
     "step_response",

@@ -14,7 +14,7 @@ from sequential.sensors.calibration import KINDS, AffineCalibration, ImuCalibrat
 from sequential.sensors.gravity import STANDARD_GRAVITY
 from sequential.sensors.recording import COUNTS, SI
 
-__all__ = ["MPU6050_COUNTS", "c_header", "calibration_hash", "nominal_calibration"]
+__all__ = ["MPU6050_COUNTS", "c_header", "calibration_hash", "nominal_calibration", "other_ranges"]
 
 Array = NDArray[np.float64]
 MPU6050_COUNTS: Mapping[str, float] = {
@@ -24,6 +24,7 @@ MPU6050_COUNTS: Mapping[str, float] = {
 }
 """What a count is worth to the firmware's drivers: an MPU-6050 at ±8 g (m/s²) and ±2000 °/s (rad/s), a
 QMC5883L at ±8 G (µT)."""
+SAME_RANGE = (0.7, 1.4)  # ranges of a sensor lie a factor of two apart
 MATRIX_BITS, SHIFT_BITS = 32, 24  # struct affine_q of firmware/core/calibration_q.h
 STRUCTS = """\
 /* As in calibration_f32.h and calibration_q.h of the firmware's core, with which this may be included. */
@@ -62,6 +63,23 @@ def calibration_hash(calibration: ImuCalibration) -> int:
     An image carries it in its boot frame: `sha256sum calibration.json` begins with the same eight digits.
     """
     return int(hashlib.sha256((calibration.to_json() + "\n").encode()).hexdigest()[:8], 16)
+
+
+def other_ranges(
+    calibration: ImuCalibration, counts: Mapping[str, float] = MPU6050_COUNTS
+) -> dict[str, float]:
+    """Sensors calibrated in counts that are not the driver's, with how many of the driver's counts one is.
+
+    The constants of such an accelerometer or gyro are right for the range that it was recorded with, and wrong
+    on a board whose driver chooses `counts`.
+    """
+    found = {}
+    for one in calibration.present:
+        if one.kind != "mag" and one.unit_in == COUNTS and one.unit_out == SI[one.kind]:
+            ratio = float(np.cbrt(abs(np.linalg.det(one.matrix)))) / counts[one.kind]
+            if not SAME_RANGE[0] < ratio < SAME_RANGE[1]:
+                found[one.kind] = ratio
+    return found
 
 
 def c_header(
@@ -118,7 +136,9 @@ def c_header(
         elif one.unit_in == SI[kind]:
             lines += _constants(one.with_counts(counts[kind]), f"counts of {counts[kind]:.6g} {SI[kind]}")
         else:
-            lines += _constants(one, "")
+            ratio = other_ranges(bundle, counts).get(kind)
+            remark = "" if ratio is None else f"another range: one is {ratio:.3g} of the firmware's driver"
+            lines += _constants(one, remark)
     if bundle.g_sensitivity is not None:
         lines += _felt(bundle.g_sensitivity, "raw unit" if bundle.gyro is None else bundle.gyro.unit_in)
     return "\n".join([*lines, f"#endif /* {guard} */", ""])

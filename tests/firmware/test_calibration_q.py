@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from core_library import CORE, AffineQ, Axes, Axes16, ImuQ, ImuRaw, compiled
 
+from factorlab.firmware.build import constants_header
+from sequential.errors import DataError
 from sequential.sensors import (
     AffineCalibration,
     ImuCalibration,
     c_header,
     calibration_hash,
     nominal_calibration,
+    other_ranges,
 )
 
 EDGES = (-(2**31), -(2**31) + 1, -1, 0, 1, 2**31 - 1)
@@ -146,6 +149,18 @@ def test_readings_in_si_become_counts_of_the_driver(rng):
     np.testing.assert_allclose(np.array(shift) * 2.0**-24, gain @ one.offset, atol=2.0**-25)
     assert "not calibrated" in header, "the gyro has the gain of its data sheet"
     assert constants(header, "gyro_calibration_q")[0][0, 0] == round(np.radians(2000) / 2**15 * 2**32)
+
+
+def test_counts_of_another_range_are_noticed(tmp_path):
+    """Recorded at ±2 g and ±250 °/s: right by itself, wrong for a driver at ±8 g and ±2000 °/s."""
+    nominal = nominal_calibration()
+    imu = ImuCalibration(nominal.accel.with_counts(0.25), nominal.gyro.with_counts(0.125))
+    assert other_ranges(imu) == pytest.approx({"accel": 0.25, "gyro": 0.125})
+    assert "another range: one is 0.125 of the firmware's driver" in c_header(imu)
+    with pytest.raises(DataError, match=r"one is 0\.25 of the firmware's"):
+        constants_header(imu, tmp_path)
+    assert not other_ranges(nominal)
+    assert "another range" not in c_header(nominal)
 
 
 def test_what_does_not_fit_is_said_in_the_header():
