@@ -70,8 +70,8 @@ def other_ranges(
 ) -> dict[str, float]:
     """Sensors calibrated in counts that are not the driver's, with how many of the driver's counts one is.
 
-    The constants of such an accelerometer or gyro are right for the range that it was recorded with, and wrong
-    on a board whose driver chooses `counts`.
+    The constants of such an accelerometer or gyro are right for the range that it was recorded with, and
+    wrong on a board whose driver chooses `counts`.
     """
     found = {}
     for one in calibration.present:
