@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factorlab.firmware.avr import ABSENT, GOOD, HUNG, RECORD, emulate_avr
+from factorlab.firmware.avr import ABSENT, CLOCK_HZ, GOOD, HUNG, RECORD, emulate_avr
 from factorlab.firmware.toolchain import run_tool
 from sequential.errors import DataError, ShapeError, ToolMissingError
-from sequential.readers.serial import Status
+from sequential.readers.serial import BootFrame, RawFrame, SerialDecoder, Status
 
 MISSING, OVERRUN, SATURATED = Status.SAMPLE_MISSING, Status.OVERRUN, Status.SATURATED
 APP = Path(__file__).resolve().parents[2] / "firmware" / "app"
@@ -223,3 +223,37 @@ def test_bus_is_freed_by_nine_clocks_and_a_stop(avr_image, avr_simulator, counts
     clocks = [clock, 0] * 9
     stop = [clock, clock | data, data, 0]
     assert pulled.tolist() == clocks + stop
+
+
+def test_commands_are_obeyed_in_order(recorder, counts, avr_image, avr_simulator, tmp_path):
+    (tmp_path / "samples").write_bytes(counts[:50].astype("<i2").tobytes())
+    files = [avr_image(FILTER="none"), tmp_path / "samples", tmp_path / "records"]
+    run_tool([str(avr_simulator), *map(str, files), "--send", "t?\x01bqbr"])
+    records = np.fromfile(tmp_path / "records", RECORD)
+    decoder = SerialDecoder()
+    frames = decoder.feed(records["value"][records["kind"] == b"B"].tobytes())
+    assert decoder.corrupt == decoder.discarded == 0
+    assert sum(isinstance(frame, BootFrame) for frame in frames) == 3  # its own, and two that were asked for
+    assert isinstance(frames[-1], RawFrame)
+    assert [frame.sequence for frame in frames] == list(range(len(frames)))
+
+
+def test_frame_that_misses_its_phase_leaves_when_it_is_ready(avr_image, avr_simulator, rng):
+    level = np.array([0, 0, 4096, 0, 0, 0, 0]) + rng.integers(-20, 20, (200, 7))
+    image = avr_image(FILTER="mahony_q", PHASE_UPDATE_US="100")
+    emulation = emulate_avr(image, level, simulator=avr_simulator)
+    assert emulation.lost == emulation.corrupt == 0
+    after_update = emulation.latency - emulation.update_cycles / CLOCK_HZ
+    assert after_update.min() > 0
+    assert np.ptp(after_update) < 2e-6  # decoding before it, one byte into the ring after it
+
+
+@pytest.mark.slow
+def test_no_frame_of_many_is_lost(recorder, rng, pytestconfig):
+    """With --full more frames than there are sequence numbers."""
+    many = rng.integers(-20_000, 20_000, (66_000 if pytestconfig.getoption("--full") else 6000, 7))
+    emulation = recorder(many)
+    assert emulation.lost == emulation.corrupt == 0
+    sequence = np.array([frame.sequence for frame in emulation.frames])
+    np.testing.assert_array_equal(sequence, (sequence[0] + np.arange(len(many))) % 65536)
+    np.testing.assert_array_equal(received(emulation), many)
