@@ -13,11 +13,11 @@
  * considered, not corrected (Schmidt), so that the answer without magnetometer is there as well.
  *
  * Source: Sola 2017, Quaternion kinematics for the error-state Kalman filter, section 7 (global error);
- * Schmidt 1966 for what is considered only; Laidig and Seel 2023, VQF, for acceleration that averages to
- * zero.  The same filter as sequential.attitude.ErrorStateAttitude, whose docstring tells what each setting does: on
+ * Schmidt 1966 for what is considered only; Laidig and Seel 2023, VQF, for motion that stays bounded.
+ * The same filter as sequential.attitude.ErrorStateAttitude, whose docstring tells what each setting does: on
  * ten trials of BROAD within 0.008 deg RMS of it, covariances within 1e-3.  In single precision: covariances
- * are lower triangles, errors are put into the values as they are found, and the heading is kept as the
- * cosine and sine of its half, without trigonometry.  What the field, and the gyro at rest, correct at the end of a
+ * are lower triangles, errors are put into the values as they are found, and the heading is kept as cosine
+ * and sine of its half, without trigonometry.  What the field, and the gyro at rest, correct at the end of a
  * block comes with the next sample, so that no update does all the work.
  *
  * Cost, Cortex-M4F, gcc -O2, instructions: 100 Hz 2 160 an update (9-D), 1 540 (6-D), half of that at 286 Hz;

@@ -97,7 +97,7 @@ float error_state_f32_read(float *values, float *row, int n, struct error_state_
         const float gain = inverse * g[i];
         values[i] += gain * innovation;
         switch (i) {
-        default:
+        case 9:
             TAKE(9); /* fall through */
         case 8:
             TAKE(8); /* fall through */
@@ -117,6 +117,9 @@ float error_state_f32_read(float *values, float *row, int n, struct error_state_
             TAKE(1); /* fall through */
         case 0:
             TAKE(0);
+            break;
+        default:
+            break;
         }
         row += i;
         *row = larger_f32(*row, LEAST_VARIANCE);

@@ -15,7 +15,6 @@ ONCE_F32
 static void ahead(const struct error_state_f32_state *s, float c, float d, float out[4])
 {
     float by[4], about[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    int i;
     about[0] = c;
     about[3] = d;
     by[0] = 1.0f;
@@ -24,6 +23,7 @@ static void ahead(const struct error_state_f32_state *s, float c, float d, float
     error_state_f32_multiply(about, by, out);
     error_state_f32_normalise(out, 4);
     if (out[0] < 0.0f) {
+        int i;
         for (i = 0; i < 4; i++) {
             out[i] = -out[i];
         }

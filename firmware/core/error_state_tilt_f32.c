@@ -125,7 +125,6 @@ void error_state_f32_widen_tilt(struct error_state_f32_state *s, const struct er
                                 float tilt, float heading)
 {
     float *p = s->tilt_cov;
-    int i;
     error_state_f32_fill(p + LOWER(6, 0), 34, 0.0f);
     error_state_f32_fill(s->tilt + 6, 4, 0.0f);
     p[LOWER(6, 6)] = d->velocity_prior;
@@ -135,6 +134,7 @@ void error_state_f32_widen_tilt(struct error_state_f32_state *s, const struct er
     error_state_f32_widen(p, 0, 2, tilt);
     p[LOWER(2, 2)] += heading;
     if (p[LOWER(0, 0)] > UNKNOWN_TILT || p[LOWER(1, 1)] > UNKNOWN_TILT) {
+        int i;
         for (i = 1; i < 6; i++) {
             error_state_f32_fill(p + LOWER(i, 0), 2, 0.0f);
         }
