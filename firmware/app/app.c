@@ -20,7 +20,7 @@ struct app {
     uint8_t due;       /* 1: this period has not had its frame yet */
     uint8_t prepared;  /* 1: the filter has the accelerometer of this period */
     uint8_t periods;   /* since the last sample, at most 255 */
-    uint8_t overrun;   /* FRAME_OVERRUN: a frame was dropped since one was sent */
+    uint8_t overrun;   /* FRAME_OVERRUN: a frame was dropped, which no status has said yet */
 };
 
 static struct app app;
@@ -45,7 +45,6 @@ static void send_first(uint8_t byte)
 static void send_rest(const uint8_t *frame, uint8_t length)
 {
     (void)board_write(frame + 1, (uint8_t)(length - 1U));
-    app.overrun = 0;
     app.sequence++;
 }
 
@@ -100,7 +99,10 @@ static void report(uint8_t status)
     if (has_room(app.mode == COMMAND_TEXT ? TEXT_LARGEST : FRAME_LARGEST) == 0U) {
         return;
     }
-    status = (uint8_t)(status | app.overrun);
+    if (app.mode != COMMAND_TEXT) { /* a line has no status to say it in */
+        status = (uint8_t)(status | app.overrun);
+        app.overrun = 0;
+    }
     switch (app.mode) {
     case COMMAND_ANGLES:
         send_angles(status);
