@@ -79,6 +79,8 @@ def serial(port: str, out: Path, as_json: bool, **options: Any) -> int:
     """
     from factorlab.live import RecordSettings, SerialPort, record_serial
 
+    if out.suffix == ".tum" and options["mode"] == "raw":
+        raise click.UsageError(f"{out} would hold attitudes; add --mode quaternion, or name a .csv")
     settings = RecordSettings(options["mode"], options["seconds"], options["wait"])
     with _stopping() as stopped, SerialPort(port, options["baud"]) as line, _counter() as tell:
         recorded = record_serial(line, out, settings, force=options["force"], stopped=stopped, tell=tell)

@@ -272,6 +272,12 @@ def test_the_speed_is_found_out(core, tmp_path, monkeypatch):
     assert "no frame among them at 57600 bit/s" in done.stderr
 
 
+def test_raw_samples_are_no_trajectory(tmp_path):
+    done = record("/dev/null", tmp_path / "imu.tum")
+    assert done.exit_code == 2
+    assert "--mode quaternion" in done.stderr
+
+
 def test_doctor_says_what_boards_take():
     done = CliRunner().invoke(main, ["doctor", "--json"])
     places = json.loads(done.stdout)["places"]
