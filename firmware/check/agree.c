@@ -5,7 +5,7 @@
  * and runs of them, with periods that drop out; the state is never reset, so that one wrong bit stays.
  *
  * AGREE_SAMPLES is their number; AGREE_MODULES chooses by bits (below), since an emulated AVR is slow.
- * Source: samples by Marsaglia's xorshift (2003), checksums by Fowler, Noll and Vo (FNV-1a over words).
+ * Source: checksums by Fowler, Noll and Vo (FNV-1a over words).
  */
 #include "../core/calibration_q.h"
 #include "../core/complementary_q.h"
@@ -19,6 +19,7 @@
 
 #include <stddef.h>
 
+#include "agree_samples.h"
 #include "agree_target.h"
 
 #define TRIG 0x01
@@ -35,18 +36,7 @@
 #endif
 #define BLOCK 1000U
 
-static uint32_t random_state;
 static uint32_t checksum;
-static struct imu_q sample;
-static uint8_t periods;
-
-static uint32_t random_bits(void)
-{
-    random_state ^= random_state << 13;
-    random_state ^= random_state >> 17;
-    random_state ^= random_state << 5;
-    return random_state;
-}
 
 static void add(uint32_t word)
 {
@@ -57,44 +47,6 @@ static void add_all(const int32_t *words, uint8_t count)
 {
     for (uint8_t i = 0; i < count; i++) {
         add((uint32_t)words[i]);
-    }
-}
-
-/* One of the numbers at which arithmetic goes wrong. */
-static int32_t extreme(void)
-{
-    static const int32_t ends[8] = {0, 1, -1, INT32_MAX, -INT32_MAX, INT32_C(0x40000000), INT32_C(0x8000), -INT32_C(0x8000)};
-    const uint8_t which = (uint8_t)(random_bits() >> 24) & 15U;
-
-    return which < 8U ? ends[which] : (which == 8U ? INT32_MIN : (int32_t)random_bits());
-}
-
-/* Calm in three quarters of all runs of 64 samples. */
-static void next_sample(uint32_t k)
-{
-    static uint8_t kind;
-
-    if ((k & 63U) == 0U) {
-        kind = (uint8_t)(random_bits() >> 24);
-    }
-    periods = (random_bits() >> 25) == 0U ? (uint8_t)(random_bits() >> 24) : 1;
-    for (uint8_t i = 0; i < 3; i++) {
-        if (kind < 192U) {
-            sample.gyro[i] += ((int32_t)random_bits() >> 9) - (sample.gyro[i] >> 4);
-            sample.accel[i] = (int16_t)((i == 2U ? 2511 : 0) + ((int32_t)random_bits() >> 23));
-            sample.mag[i] = (kind & 1U) != 0 ? (int16_t)((i == 0U ? 5000 : -9000) + ((int32_t)random_bits() >> 22)) : 0;
-        } else if (kind < 224U) {
-            sample.gyro[i] = (int32_t)random_bits();
-            sample.accel[i] = (int16_t)(uint16_t)random_bits();
-            sample.mag[i] = (int16_t)(uint16_t)random_bits();
-        } else {
-            sample.gyro[i] = (kind & 2U) != 0 ? extreme() : 0;
-            sample.accel[i] = (kind & 1U) != 0 ? (int16_t)(uint16_t)((uint32_t)extreme() >> 16) : 0;
-            sample.mag[i] = (kind & 4U) != 0 ? (int16_t)(uint16_t)((uint32_t)extreme() >> 16) : 0;
-        }
-    }
-    if (kind < 192U && (k & 63U) == 0U) {
-        sample.gyro[0] = sample.gyro[1] = sample.gyro[2] = 0; /* after what noise has left */
     }
 }
 
@@ -196,7 +148,7 @@ static void complementary_step(uint8_t first)
     add(state.status);
 }
 
-/* `value` in 8 hexadecimal digits, or a small number in decimals. */
+/* `value` in 8 hexadecimal digits. */
 static void print_hex(uint32_t value)
 {
     for (uint8_t i = 0; i < 8; i++) {
@@ -215,11 +167,8 @@ static void print_text(const char *text)
 
 static void run(const char *name, void (*step)(uint8_t first))
 {
-    random_state = UINT32_C(2463534242);
+    first_again();
     checksum = UINT32_C(2166136261);
-    for (uint8_t i = 0; i < 3; i++) {
-        sample.gyro[i] = 0;
-    }
     for (uint32_t k = 0; k < AGREE_SAMPLES; k++) {
         next_sample(k);
         step(k == 0U);

@@ -193,8 +193,6 @@ static void head(struct tilt_q_state *s, const struct tilt_q_derived *d, const i
 
 void tilt_q_step(struct tilt_q_state *s, const struct tilt_q_derived *d, const struct imu_q *sample, uint8_t periods)
 {
-    int32_t rate[3];
-
     s->status = 0;
     if (periods > d->pause_periods) {
         periods = 0;
@@ -203,6 +201,8 @@ void tilt_q_step(struct tilt_q_state *s, const struct tilt_q_derived *d, const s
         }
     }
     if (periods > 0U) {
+        int32_t rate[3];
+
         rates(s, sample->gyro, rate);
         for (uint8_t i = 0; i < 3; i++) {
             const uint32_t turn = (uint32_t)mul32_q(rate[i], d->turn) << 3;
