@@ -7,8 +7,8 @@ from factorlab.firmware.instructions import IMU_F32, IMU_Q, count_instructions, 
 from sequential.errors import DataError, ToolMissingError
 from sequential.sensors import ImuRecording
 
-# Spins magnetometer x times round a loop of two instructions, after three and before the return.  The attitude
-# shows whether initialised variables were filled, and others cleared.
+# Spins magnetometer x times round a loop of two instructions, after three and before the return.
+# Its attitude shows whether initialised variables were filled, and others cleared.
 SPINNING = """
 #include "spin_{suffix}.h"
 static volatile int filled[3] = {{5, 6, 7}}, cleared[300];
