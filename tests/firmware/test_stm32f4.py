@@ -1,4 +1,4 @@
-"""The board file of an STM32F4: registers, image, I2C on a model of it, the rest in QEMU's STM32F405."""
+"""The board file of an STM32F4: registers, image, and what QEMU's STM32F405 makes of it."""
 
 import shutil
 import subprocess
@@ -91,43 +91,6 @@ def test_no_double_arithmetic_is_linked(stm32f4):
 def test_clock_or_line_that_cannot_be_had_is_refused(stm32f4, variables, said):
     with pytest.raises(ToolMissingError, match=said):
         stm32f4(FILTER="none", **variables)
-
-
-@pytest.fixture(scope="session")
-def i2c_model(firmware_dir, cxx_compiler, tmp_path_factory):
-    """The driver on a model of the peripheral: i2c_model("1:14") gives its lines."""
-    program = tmp_path_factory.mktemp("i2c") / "i2c"
-    source = firmware_dir.parent / "tests" / "firmware" / "stm32_i2c.cpp"
-    board = firmware_dir / "ports" / "cortex_m4" / "stm32f4"
-    run_tool([cxx_compiler, "-O1", f"-I{board}", "-Wno-overflow", str(source), "-o", str(program)])
-    return lambda *transfers: run_tool([str(program), *transfers]).splitlines()
-
-
-def device_bytes(first, count):
-    return bytes((7 * at + 1) % 256 for at in range(first, first + count)).hex()
-
-
-@pytest.mark.parametrize("late", ["", ":s"])
-@pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 14, 40])
-def test_bytes_are_read_whatever_their_number(i2c_model, length, late):
-    lines = i2c_model(*[f"1:{length}{late}"] * 3)
-    assert lines == [f"0 1 {device_bytes(0x20, length)} "] * 3 + ["violations 0"]
-
-
-@pytest.mark.parametrize("late", ["", ":s"])
-@pytest.mark.parametrize("length", [1, 2, 5])
-def test_bytes_are_written_whatever_their_number(i2c_model, length, late):
-    written = bytes(0x20 + 3 * k for k in range(1, length)).hex()
-    assert i2c_model(f"{length}:0{late}") == [f"0 1  {written}", "violations 0"]
-
-
-@pytest.mark.parametrize(("fault", "state", "events"), [("n", 2, 1), ("w", 2, 1), ("b", 3, 1), ("h", 1, 0)])
-def test_fault_of_the_bus_is_told_and_got_over(i2c_model, fault, state, events):
-    lines = i2c_model(f"3:0:{fault}", "1:14")
-    assert lines[0].startswith(f"{state} {events} ")
-    # nine clocks, a stop, and the pins given back; only where the bus hangs or failed
-    assert ("freed 21" in lines) == (fault in "bh")
-    assert lines[-2:] == [f"0 1 {device_bytes(0x20, 14)} ", "violations 0"]
 
 
 def spoken(image, commands, enough, patience=4.0):

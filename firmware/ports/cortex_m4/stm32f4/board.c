@@ -7,7 +7,6 @@
 #include "../../../app/board.h"
 
 #include "../../../core/frame.h"
-#include "../startup.h"
 #include "port.h"
 
 #ifndef PHASE
@@ -33,7 +32,7 @@ void raise_events(uint8_t events)
     interrupts_on();
 }
 
-static void systick_handler(void)
+void systick_handler(void)
 {
 #if PHASE
     serial_release(); /* a phase that never came: late is better than never */
@@ -45,7 +44,7 @@ static void systick_handler(void)
     raise_events(BOARD_TICK);
 }
 
-static void tim2_handler(void)
+void tim2_handler(void)
 {
     TIM2->sr = 0;
     serial_release();
@@ -111,20 +110,3 @@ void board_mark_update(uint8_t level)
 {
     mark(MARK_UPDATE, level);
 }
-
-__attribute__((section(".vectors"), used)) static const handler vectors[16 + USART2_IRQ + 1] = {
-    (handler)stack_top,
-    reset_handler,
-    default_handler, /* NMI */
-    default_handler, /* hard fault */
-    default_handler, /* memory, bus, usage */
-    default_handler,
-    default_handler,
-    [11] = default_handler, /* SVC */
-    [14] = default_handler, /* PendSV */
-    [15] = systick_handler,
-    [16 + TIM2_IRQ] = tim2_handler,
-    [16 + I2C1_EV_IRQ] = i2c1_event_handler,
-    [16 + I2C1_ER_IRQ] = i2c1_error_handler,
-    [16 + USART2_IRQ] = usart2_handler,
-};

@@ -24,30 +24,36 @@
 #define HSI_MHZ 16UL
 #define PATIENCE 100000UL /* turns of a loop of a few clocks */
 
-static uint8_t appears(const volatile uint32_t *where, uint32_t mask, uint32_t value)
+static uint8_t is_ready(uint32_t flag)
 {
     for (uint32_t k = 0; k < PATIENCE; k++) {
-        if ((*where & mask) == value) {
+        if ((RCC->cr & flag) != 0U) {
             return 1;
         }
     }
     return 0;
 }
 
+static void switch_to_pll(void)
+{
+    FLASH_ACR = FLASH_2_WAIT_STATES | FLASH_CACHES;
+    RCC->cfgr = RCC_CFGR_APB1_HALF | RCC_CFGR_PLL;
+    for (uint32_t k = 0; k < PATIENCE && (RCC->cfgr & RCC_CFGR_SWITCHED) != RCC_CFGR_PLL << 2; k++) {
+    }
+}
+
 void clock_start(void)
 {
     uint32_t megahertz = HSI_MHZ, source = 0;
-    RCC->cr |= (HSE_BYPASS ? RCC_CR_HSEBYP : 0UL);
+    RCC->cr |= HSE_BYPASS ? RCC_CR_HSEBYP : 0UL;
     RCC->cr |= RCC_CR_HSEON;
-    if (appears(&RCC->cr, RCC_CR_HSERDY, RCC_CR_HSERDY) != 0U) {
+    if (is_ready(RCC_CR_HSERDY) != 0U) {
         megahertz = HSE_HZ / 1000000UL;
         source = RCC_PLLCFGR_HSE;
     }
     RCC->pllcfgr = megahertz | (336UL << RCC_PLLCFGR_N) | RCC_PLLCFGR_P4 | source | (7UL << RCC_PLLCFGR_Q);
     RCC->cr |= RCC_CR_PLLON;
-    FLASH_ACR = FLASH_2_WAIT_STATES | FLASH_CACHES;
-    if (appears(&RCC->cr, RCC_CR_PLLRDY, RCC_CR_PLLRDY) != 0U) {
-        RCC->cfgr = RCC_CFGR_APB1_HALF | RCC_CFGR_PLL;
-        (void)appears(&RCC->cfgr, RCC_CFGR_SWITCHED, RCC_CFGR_PLL << 2);
+    if (is_ready(RCC_CR_PLLRDY) != 0U) {
+        switch_to_pll();
     }
 }

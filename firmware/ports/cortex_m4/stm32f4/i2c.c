@@ -4,7 +4,7 @@
  * two lie in the data and the shift register and the clock is held: so no deadline hangs on the
  * acknowledgement being taken back in time (a single byte: acknowledgement off before the address is
  * cleared; two: POS).
- * tests/firmware/stm32_i2c.cpp runs this file against a model of the peripheral made after the same pages.
+ * tests/firmware/stm32/ runs this file against a model of the peripheral made after the same pages.
  */
 #include "../../../app/board.h"
 #include "port.h"

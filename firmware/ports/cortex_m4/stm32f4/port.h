@@ -25,7 +25,9 @@ void i2c_start(void);
 /* From an interrupt: the main loop finds these events. */
 void raise_events(uint8_t events);
 
-/* Handlers. */
+/* Handlers: vectors.c. */
+void systick_handler(void);
+void tim2_handler(void);
 void usart2_handler(void);
 void i2c1_event_handler(void);
 void i2c1_error_handler(void);
