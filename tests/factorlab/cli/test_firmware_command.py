@@ -85,7 +85,7 @@ def test_a_log_runs_on_a_board(log, target, tmp_path, avr_toolchain, arm_toolcha
     done = run("emulate", log, *UNITS, "--target", target, "--json", "-o", tmp_path / "out")
     assert done.exit_code == 0, done.stderr
     whole = json.loads(done.stdout)
-    assert whole["frames"] == {"lost": 0, "corrupt": 0}
+    assert whole["frames"] == {"lost": 0, "corrupt": 0, "unlike_host": 0}
     assert whole["samples"] == 800
     assert whole["from_python_deg"]["max"] < 0.3
     assert whole["latency_us"]["min"] > 0.0
