@@ -23,7 +23,8 @@
  *   than a second (or 254 periods) nothing is integrated, and the next good angle is taken as it is, nearly.
  *   0: the first sample, nothing moves.
  * - A wrong rate scales the angles between corrections: nothing here can see it.
- * - Magnetometer all zero: yaw is predicted, not corrected.
+ * - Magnetometer all zero: yaw is predicted, not corrected.  The first field sets yaw and forgets its covariance with
+ *   the bias, which would otherwise have grown since the start and take the first headings for a bias.
  * - Pitch of +-90 deg: rates of roll and yaw are divided by 0.05 at least.
  * - Any state, sample and number of periods: no undefined behaviour, no overflow that matters.
  */

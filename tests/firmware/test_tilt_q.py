@@ -148,6 +148,19 @@ def test_a_field_that_jumps_is_refused_until_the_variance_has_grown(filter_q):
     assert path[-1, 2] == pytest.approx(path[1999, 2], abs=0.05)
 
 
+def test_a_field_that_comes_late_teaches_the_bias(filter_q, rng):
+    """A minute without a field: the first one sets yaw, and the bias is found from those that follow."""
+    samples = still(12_000, gyro=(0.0, 0.0, 0.01), mag=(0.0, 20.0, -40.0))
+    samples["gyro"] += rng.integers(-20_000, 20_000, samples["gyro"].shape)
+    samples["mag"] += rng.integers(-100, 100, samples["mag"].shape).astype(np.int16)
+    samples["mag"][:6000] = 0
+    states, _ = filter_q.run(samples)
+    yaw = (states["channel"]["angle"][6000:, 2] / 2.0**32 + 0.5) % 1.0 - 0.5
+    assert np.abs(360.0 * yaw).max() < 2.0
+    assert np.abs(biases(states)[:, 2]).max() < 0.02
+    assert biases(states)[-1, 2] == pytest.approx(0.01, abs=1e-3)
+
+
 def test_no_accelerometer_lets_the_variances_grow(filter_q):
     samples = still(3000, gyro=(0.3, 0.0, 0.0))
     samples["accel"][1:] = 0
