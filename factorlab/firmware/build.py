@@ -18,7 +18,7 @@ PORTS = {"m4": ("ports/cortex_m4", "arm-none-eabi-size"), "avr": ("ports/avr", "
 BOARDS = {"m4": ("qemu", "stm32f4"), "avr": ("atmega328p",)}
 DEFAULT_FILTER = {"m4": "mahony_f32", "avr": "mahony_q"}
 # bytes of flash and RAM
-FLASH = {"atmega328p": (32768, 2048), "stm32f4": (524288, 131072), "qemu": (4194304, 4194304)}
+FLASH = {"atmega328p": (32768, 2048), "stm32f4": (262144, 65536), "qemu": (4194304, 4194304)}
 
 
 @dataclass(frozen=True, slots=True)
