@@ -1,20 +1,21 @@
 #include "mahony_f32.h"
 
-#include "turning_f32.h"
+#include "blocks_f32.h"
 
 #define OLDEST 0.2f           /* s that one reading of the field stands for at most */
 #define SMOOTH 0.5f           /* s, time constant of what rest is judged by */
 #define STEEP_SQUARED 2.5e-7f /* 1/4 sin^2 of the angle to the vertical below which a field has no heading */
 
-/* Low-pass gyro and accelerometer, count the time at rest, draw the bias to the mean; whether it rests. */
+/* Low-pass gyro and accelerometer, and count the time at rest; whether it rests. */
 INLINE_F32 int rest(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
-                    struct vector_f32 gyro, struct vector_f32 accel, float dt, struct vector_f32 *bias)
+                    struct vector_f32 gyro, struct vector_f32 accel, float dt)
 {
     const float keep = dt / (SMOOTH + dt);
-    const struct vector_f32 mean_gyro = drawn_f32(load_vector_f32(s->mean_gyro), gyro, keep);
-    const struct vector_f32 mean_accel = drawn_f32(load_vector_f32(s->mean_accel), accel, keep);
-    store_vector_f32(s->mean_gyro, mean_gyro);
-    store_vector_f32(s->mean_accel, mean_accel);
+    struct vector_f32 mean_gyro, mean_accel;
+    LOAD_VECTORS_F32(s->mean_gyro, s->mean_accel, mean_gyro, mean_accel, s6, s7, s8, s9, s10, s11);
+    mean_gyro = drawn_f32(mean_gyro, gyro, keep);
+    mean_accel = drawn_f32(mean_accel, accel, keep);
+    STORE_VECTORS_F32(s->mean_gyro, s->mean_accel, mean_gyro, mean_accel, s6, s7, s8, s9, s10, s11);
     if (!(near_f32(gyro, mean_gyro, d->rest_gyro) && near_f32(accel, mean_accel, d->rest_accel)
           && below_f32(mean_gyro.x, d->bias_bound) && below_f32(mean_gyro.y, d->bias_bound)
           && below_f32(mean_gyro.z, d->bias_bound))) {
@@ -22,11 +23,7 @@ INLINE_F32 int rest(struct mahony_f32_state *restrict s, const struct mahony_f32
         return 0;
     }
     s->at_rest += dt;
-    if (s->at_rest <= d->rest_time) {
-        return 0;
-    }
-    *bias = drawn_f32(*bias, mean_gyro, dt / (d->rest_constant + dt));
-    return 1;
+    return s->at_rest > d->rest_time;
 }
 
 /* The time that the accelerometer's error counts for, doubled; less where it is longer than its limit.
@@ -34,14 +31,13 @@ INLINE_F32 int rest(struct mahony_f32_state *restrict s, const struct mahony_f32
 INLINE_F32 float counting(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
                           float east, float south, float dt)
 {
-    const float keep = dt / (d->lasting_time + dt);
-    const float lasting_east = s->lasting[0] + (east - s->lasting[0]) * keep;
-    const float lasting_north = s->lasting[1] - (south + s->lasting[1]) * keep;
+    const float keep = dt / (d->lasting_time + dt), squared = east * east + south * south;
+    float twice = dt + dt, lasting_east, lasting_north;
+    LOAD_PAIR_F32(s->lasting, lasting_east, lasting_north, s22, s23);
+    lasting_east += (east - lasting_east) * keep;
+    lasting_north -= (south + lasting_north) * keep;
+    STORE_PAIR_F32(s->lasting, lasting_east, lasting_north, s22, s23);
     const float limit = d->error_limit + sqrtf(lasting_east * lasting_east + lasting_north * lasting_north);
-    const float squared = east * east + south * south;
-    float twice = dt + dt;
-    s->lasting[0] = lasting_east;
-    s->lasting[1] = lasting_north;
     if (squared > limit * limit && !s->starting) {
         twice *= limit / sqrtf(squared);
     }
@@ -130,21 +126,22 @@ static void begin(struct mahony_f32_state *restrict s)
     s->starting = 1;
 }
 
-/* What the quick start adds to the gains; counts its time. */
-static float boosted(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
-                     float dt)
+/* What the quick start adds to the gains. */
+static float boost(const struct mahony_f32_state *s, const struct mahony_f32_derived *d)
 {
-    s->since_start += dt;
-    s->starting = s->since_start < d->start_time;
-    return s->starting ? d->boost * (1.0f - s->since_start * d->start_rate) : 0.0f;
+    return d->boost * (1.0f - s->since_start * d->start_rate);
 }
 
 /* A step, with or without a magnetometer: the compiler makes two functions of it. */
 INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
                      const struct imu_f32 *restrict sample, float dt, int with_field)
 {
-    const struct vector_f32 gyro = load_vector_f32(sample->gyro), zero = {0.0f, 0.0f, 0.0f};
-    float kp = d->gain, kh = d->heading_gain, ki = d->integral_gain, counts = 0.0f;
+    struct vector_f32 gyro, accel, bias, tilt = {0.0f, 0.0f, 0.0f};
+    struct heading heading = {{0.0f, 0.0f, 0.0f}, 0.0f};
+    struct quaternion_f32 q;
+    float counts = 0.0f;
+    int resting = 0;
+    LOAD_VECTORS_F32(sample->gyro, sample->accel, gyro, accel, s15, s16, s17, s18, s19, s20);
     if (RARELY_F32(!is_rate_f32(gyro))) {
         return;
     }
@@ -153,22 +150,17 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
         dt = 0.0f;
     }
     if (RARELY_F32(s->starting)) {
-        const float boost = boosted(s, d, dt);
-        kp += boost;
-        kh += boost;
-        ki = s->starting ? 0.0f : ki;
+        s->since_start += dt;
+        s->starting = s->since_start < d->start_time;
     }
-    const struct vector_f32 accel = load_vector_f32(sample->accel);
     const float force = dot_f32(accel, accel);
     const int bad = !usable_f32(force);
-    struct vector_f32 bias = load_vector_f32(s->gyro_bias), tilt = zero;
-    struct heading heading = {zero, 0.0f};
     if (bad) {
         s->at_rest = 0.0f;
-    } else if (rest(s, d, gyro, accel, dt, &bias)) {
-        ki = 0.0f;
+    } else {
+        resting = rest(s, d, gyro, accel, dt);
     }
-    struct quaternion_f32 q = load_quaternion_f32(s->world_q_body);
+    LOAD_QUATERNION_F32(s->world_q_body, q, s2, s3, s4, s5);
     const struct level_rows_f32 rows = level_rows_f32(q);
     if (!bad) {
         const float scale = 2.0f / sqrtf(force);
@@ -177,16 +169,31 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
         counts = counting(s, d, east, south, dt);
     }
     if (with_field) {
-        heading = heading_error(s, d, rows, load_vector_f32(sample->mag), dt, &q);
-        bias = minus_f32(bias, heading.axis, ki * heading.times);
+        struct vector_f32 mag;
+        LOAD_VECTOR_F32(sample->mag, mag, s26, s27, s28);
+        heading = heading_error(s, d, rows, mag, dt, &q);
     }
-    bias = limited_f32(minus_f32(bias, tilt, ki * counts), d->bias_limit, d->bias_bound);
-    store_vector_f32(s->gyro_bias, bias);
+    float kp = d->gain, kh = d->heading_gain;
+    LOAD_VECTOR_F32(s->gyro_bias, bias, s12, s13, s14);
+    if (RARELY_F32(resting)) {
+        bias = drawn_f32(bias, load_vector_f32(s->mean_gyro), dt / (d->rest_constant + dt));
+    }
+    if (RARELY_F32(s->starting)) {
+        kp += boost(s, d);
+        kh += boost(s, d);
+    } else if (!resting) {
+        bias = minus_f32(bias, tilt, d->integral_gain * counts);
+        if (with_field) {
+            bias = minus_f32(bias, heading.axis, d->integral_gain * heading.times);
+        }
+    }
+    bias = limited_f32(bias, d->bias_limit, d->bias_bound);
     struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, kp * counts);
     if (with_field) {
         r = plus_f32(r, heading.axis, kh * heading.times);
     }
-    store_quaternion_f32(s->world_q_body, turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r))));
+    q = turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r)));
+    STORE_ATTITUDE_F32(s->world_q_body, s->gyro_bias, q, bias, s8, s9, s10, s11, s12, s13, s14);
 }
 
 void mahony_f32_step(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,

@@ -128,11 +128,10 @@ INLINE_F32 float clamped_f32(float x, float limit)
     return x > limit ? limit : (x < -limit ? -limit : x);
 }
 
-/* v with every axis within a limit, given also as its bound; it hardly ever is beyond, which one comparison of
- * the three sizes tells. */
+/* v with every axis within a limit, given also as its bound; it hardly ever is beyond. */
 INLINE_F32 struct vector_f32 limited_f32(struct vector_f32 v, float limit, uint32_t bound)
 {
-    if (RARELY_F32((uint32_t)((bits_f32(v.x) | bits_f32(v.y) | bits_f32(v.z)) << 1) > bound)) {
+    if (RARELY_F32(!(below_f32(v.x, bound) && below_f32(v.y, bound) && below_f32(v.z, bound)))) {
         return vector_f32(clamped_f32(v.x, limit), clamped_f32(v.y, limit), clamped_f32(v.z, limit));
     }
     return v;

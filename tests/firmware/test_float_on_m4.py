@@ -10,7 +10,7 @@ from sequential.readers import read_broad
 
 PERIOD = float(np.float32(0.01))
 ROWS = 6000
-BUDGET = {"mahony_f32_step": 300, "mahony_f32_step_6d": 225, "mahony_f32_step_published": 140}
+BUDGET = {"mahony_f32_step": 260, "mahony_f32_step_6d": 200, "mahony_f32_step_published": 110}
 """Instructions an update, on average over the recording."""
 PAIRS = {"complementary": COMPLEMENTARY, "kalman": TILT, "mahony": MAHONY}
 PYTHON = {"complementary": ComplementaryAttitude(), "kalman": TiltKalman(), "mahony": Mahony()}
