@@ -13,8 +13,8 @@
  * step agrees to 1e-6.  R (a x v) = (R a) x z, so that both the error and its lasting part come from two rows
  * of the rotation matrix.
  *
- * Cost: instructions on a Cortex-M4F, -O2, with and without vmla: 9-D 249/304, 6-D 189/233,
- * `mahony_f32_step_published` 106/139; firmware/budget.csv.
+ * Cost: instructions on a Cortex-M4F, -O2, with and without vmla: 9-D 251/304, 6-D 189/233,
+ * `mahony_f32_step_published` 104/137; firmware/budget.csv.
  *
  * What it does with bad input
  *   gyro NaN, infinite, above 8192 rad/s   the sample changes nothing at all

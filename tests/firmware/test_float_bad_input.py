@@ -130,7 +130,7 @@ def test_after_a_second_of_bad_samples_it_is_where_python_is(filt, world, bad):
         assert abs(np.linalg.norm(own.quaternion) - 1) < 5e-7
     expected, found = own.pair.seen(python, state), own.pair.seen(python, own.numbers)
     if own.pair is TILT and bad == "gyro at 2000 deg/s":
-        # the angles fold thirty times a second, in one filter a sample before the other: their variances agree
+        # the angles fold thirty times a second, in one filter a sample before the other; variances agree
         expected, found = expected[9:], found[9:]
     np.testing.assert_allclose(found, expected, atol=2e-4, rtol=1e-4)
 

@@ -35,13 +35,12 @@ class Frames:
     count: int
 
 
-def instructions(module: str, recording: ImuRecording, *, magnetometer: bool) -> InstructionCounts:
-    """Every update over a recording at a board's 100 Hz, on the Cortex-M4F."""
+def instructions(module: str, recording: ImuRecording, axes: str) -> InstructionCounts:
+    """Every update over a recording at 100 Hz, on the Cortex-M4F; axes as in firmware/budget.csv."""
     given = sampled(recording)
-    given = given if magnetometer else replace(given, mag=None)
+    given = given if axes == "9-D" else replace(given, mag=None)
     samples = imu_q(given) if module.endswith("_q") else imu_f32(given)
-    step = STEPS.get((module, "9-D" if magnetometer else "6-D"))
-    return count_instructions(module, samples, rate=100.0, step=step)
+    return count_instructions(module, samples, rate=100.0, step=STEPS.get((module, axes)))
 
 
 def avr_cycles(module: str, recording: ImuRecording) -> CycleCounts:
