@@ -9,7 +9,7 @@ PIP_FLAGS := -qq --disable-pip-version-check --no-input
 EVERYTHING := .[test,cloud]
 BENCH_OUT := build/bench
 # Debian packages that tests ask for: a command, or a file where a package brings none, and the package
-PACKAGES := chromium gcc make \
+PACKAGES := chromium gcc g++ make \
 	arm-none-eabi-gcc:gcc-arm-none-eabi /usr/lib/arm-none-eabi/include/stdio.h:libnewlib-arm-none-eabi qemu-system-arm \
 	avr-gcc:gcc-avr /usr/lib/avr/include/avr/io.h:avr-libc simavr /usr/include/simavr/sim_avr.h:libsimavr-dev \
 	/usr/include/libelf.h:libelf-dev /usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h:arduino-core-avr \
