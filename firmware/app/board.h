@@ -30,7 +30,7 @@ extern "C" {
 #define BOARD_RECEIVED 0x04U /* bytes have come on the serial line */
 #define BOARD_I2C_PART 0x08U /* BOARD_PART bytes of the transfer have been read; a board may never say so */
 
-#define BOARD_PART 8U /* bytes: of a sample, accelerometer and temperature, which need not wait for the gyro */
+#define BOARD_PART 6U /* bytes: of a sample, the accelerometer, which need not wait for the rest */
 
 /* How a transfer stands. */
 #define BOARD_I2C_DONE 0U

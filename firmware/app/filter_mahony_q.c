@@ -4,6 +4,7 @@
 
 #define MODULE mahony_q
 #define KIND BOOT_MAHONY_Q
+#define START_GYRO(state, sample) memcpy((state)->gyro_low, (sample)->gyro, sizeof (state)->gyro_low)
 #include "filter_q.h"
 
 void filter_bias(int32_t bias[3])

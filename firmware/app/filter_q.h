@@ -1,8 +1,8 @@
 /* What all filters in fixed point have in common behind filter.h; constants are those of 100 samples a
  * second.
  *
- * The file that includes this says which one it is: MODULE its name, KIND its number in a boot frame; it adds
- * `filter_bias` and `filter_status`.
+ * The file that includes this says which one it is: MODULE its name, KIND its number in a boot frame, START_GYRO
+ * what its start takes from the gyro; it adds `filter_bias` and `filter_status`.
  */
 #include <string.h>
 
@@ -32,6 +32,10 @@ void filter_start(void)
 void filter_accel(const int16_t accel[3])
 {
     sample_accel_q(accel, &sample);
+    if (started == 0U) { /* while the gyro is on the bus: to level the filter takes longer than to update it */
+        sample.gyro[0] = sample.gyro[1] = sample.gyro[2] = 0;
+        OF(_start)(&state, &DERIVED, &sample);
+    }
 }
 
 void filter_update(const int16_t gyro[3], uint8_t periods)
@@ -40,7 +44,7 @@ void filter_update(const int16_t gyro[3], uint8_t periods)
     if (started == 0U) {
         started = 1;
         periods = 0;
-        OF(_start)(&state, &DERIVED, &sample);
+        START_GYRO(&state, &sample);
     }
     OF(_step)(&state, &DERIVED, &sample, periods);
     OF(_attitude)(&state, attitude);

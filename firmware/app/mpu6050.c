@@ -144,7 +144,7 @@ uint8_t mpu6050_part(struct mpu6050 *sensor)
     if (sensor->step != READ) {
         return 0;
     }
-    decode(sensor, MPU6050_GYRO);
+    decode(sensor, BOARD_PART / 2U);
     return 1;
 }
 

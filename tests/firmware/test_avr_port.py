@@ -243,7 +243,8 @@ def test_frame_that_misses_its_phase_leaves_when_it_is_ready(avr_image, avr_simu
     image = avr_image(FILTER="mahony_q", PHASE_UPDATE_US="100")
     emulation = emulate_avr(image, level, simulator=avr_simulator)
     assert emulation.lost == emulation.corrupt == 0
-    after_update = emulation.latency - emulation.update_cycles / CLOCK_HZ
+    # the first sample is levelled before what counts as its update
+    after_update = (emulation.latency - emulation.update_cycles / CLOCK_HZ)[1:]
     assert after_update.min() > 0
     assert np.ptp(after_update) < 2e-6  # decoding before it, one byte into the ring after it
 
