@@ -21,7 +21,7 @@ COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 def build(command, firmware_dir, image, module, samples, extra=()):
     """check/agree.c with the whole fixed-point core, for one module."""
-    core = [*sorted((firmware_dir / "core").glob("*_q.c")), *sorted((firmware_dir / "core").glob("*_q_*.c"))]
+    core = sorted((firmware_dir / "core").glob("*_q*.c"))
     defined = (f"-DAGREE_SAMPLES={samples}UL", f"-DAGREE_MODULES={MODULES[module]}")
     agree = firmware_dir / "check" / "agree.c"
     subprocess.run([*command, *FLAGS, *defined, agree, *core, *extra, "-lm", "-o", image], check=True)
