@@ -3,46 +3,65 @@
 
 #include "mahony_q_parts.h"
 
+#ifdef __GNUC__
+#define SELDOM __attribute__((noinline)) /* lest every step saves the registers that it needs */
+#else
+#define SELDOM
+#endif
+
 /* n / (periods + n), Q16: in a low-pass. */
-static uint16_t share(uint16_t periods, uint8_t n)
+static SELDOM uint16_t share(uint16_t periods, uint8_t n)
 {
     return (uint16_t)(((uint32_t)n << 16) / ((uint32_t)periods + n));
 }
 
-static uint16_t times(uint16_t weight, uint8_t n)
+static SELDOM uint16_t times(uint16_t weight, uint8_t n)
 {
     const uint32_t product = (uint32_t)weight * n;
     return product > UINT16_MAX ? UINT16_MAX : (uint16_t)product;
 }
 
+/* A sample that stands for several periods. */
+static SELDOM void step_over(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
+                             uint8_t periods, uint16_t gain)
+{
+    struct mahony_q_weights weights;
+    weights.low = share(d->low_periods, periods);
+    weights.rest = share(d->constant_periods, periods);
+    weights.lasting = times(d->weights.lasting, periods);
+    weights.integral = times(d->weights.integral, periods);
+    weights.periods = periods;
+    mahony_q_update(s, d, sample, &weights, gain);
+}
+
+/* k_P while the quick start lasts. */
+static SELDOM uint16_t starting(struct mahony_q_state *s, const struct mahony_q_derived *d, uint8_t periods)
+{
+    s->start_left = s->start_left > periods ? (uint16_t)(s->start_left - periods) : 0U;
+    return (uint16_t)(d->gain + (uint16_t)(((uint32_t)d->boost * s->start_left) >> 8));
+}
+
+#ifdef __AVR__ /* the usual case is in mahony_q_avr.c */
+#pragma GCC optimize("Os")
+#define mahony_q_step mahony_q_step_seldom
+void mahony_q_step_seldom(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
+                          uint8_t periods);
+#endif
+
 void mahony_q_step(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
                    uint8_t periods)
 {
-    const struct mahony_q_weights *weights = &d->weights;
-    struct mahony_q_weights several;
-    uint16_t gain = d->gain;
-
     if (periods > d->pause_periods) {
         s->start_left = d->start_periods;
         s->still = 0;
-        return;
+    } else if (periods != 0U) {
+        const uint16_t gain = s->start_left == 0U ? d->gain : starting(s, d, periods);
+        if (periods == 1U) {
+            mahony_q_update(s, d, sample, &d->weights, gain);
+        } else {
+            step_over(s, d, sample, periods, gain);
+        }
     }
-    if (periods == 0U) {
-        return;
-    }
-    if (periods != 1U) {
-        several.low = share(d->low_periods, periods);
-        several.rest = share(d->constant_periods, periods);
-        several.lasting = times(d->weights.lasting, periods);
-        several.integral = times(d->weights.integral, periods);
-        several.periods = periods;
-        weights = &several;
-    }
-    if (s->start_left != 0U) {
-        s->start_left = s->start_left > periods ? (uint16_t)(s->start_left - periods) : 0U;
-        gain = (uint16_t)(gain + (uint16_t)(((uint32_t)d->boost * s->start_left) >> 8));
-    }
-    mahony_q_update(s, d, sample, weights, gain);
 }
 
 void mahony_q_attitude(const struct mahony_q_state *s, int32_t world_q_body[4])

@@ -68,7 +68,7 @@ struct mahony_q_derived {
     uint32_t half_period;            /* s, Q31 */
     int32_t bias_limit;              /* rad/s, Q32 */
     int32_t rest_gyro;               /* rad/s, Q24 */
-    int32_t rest_accel;              /* m/s^2, Q16 */
+    int32_t rest_accel;              /* m/s^2, Q8 */
     struct mahony_q_weights weights; /* of a sample that stands for one period */
     uint16_t gain;                   /* k_P times half a period, Q18 */
     uint16_t boost;                  /* what is added to `gain` for each period left of the start, Q26 */

@@ -11,7 +11,7 @@ static const struct mahony_q_derived mahony_q_100hz = {
     10737418UL, /* half a period: 0.005 s, Q31 */
     429496736L, /* bias limit: 0.1 rad/s, Q32 */
     587203L,    /* gyro at rest: 0.035 rad/s, Q24 */
-    32768L,     /* accelerometer at rest: 0.5 m/s^2, Q16 */
+    128L,       /* accelerometer at rest: 0.5 m/s^2, Q8 */
     {
         1285, /* low-passes: 1 / 51, Q16 */
         649,  /* bias at rest: 1 / 101, Q16 */

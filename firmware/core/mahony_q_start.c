@@ -1,68 +1,93 @@
 /* The start of mahony_q.h: the attitude of yaw 0 in which a specific force points up. */
 #include "mahony_q.h"
 
-#include "fixed_q.h"
+#if !defined(__AVR__) || defined(FACTORLAB_PORTABLE)
 
-#define ONE_Q15 0x7FFF
-#define ONE_Q30 0x40000000L
-
-/* (c, s) along the half of the angle whose cosine and sine are (cosine, sine) / length, of unit length, Q15. */
-static void half_of(int16_t cosine, int16_t sine, uint16_t length, int16_t *c, int16_t *s)
+/* sqrt(x), rounded down, bit by bit. */
+static uint16_t root(uint32_t x)
 {
-    const uint16_t beside = (uint16_t)(sine < 0 ? -(int32_t)sine : sine);
-    uint16_t along = (uint16_t)(length + (uint16_t)(cosine < 0 ? -(int32_t)cosine : cosine));
-    uint16_t across = beside;
-    uint32_t squared = (uint32_t)along * along + (uint32_t)across * across;
-    *c = ONE_Q15;
-    *s = 0;
-    if (squared == 0) {
+    uint16_t found = 0;
+    for (uint16_t bit = 0x8000U; bit != 0U; bit >>= 1) {
+        const uint16_t tried = found | bit;
+        if ((uint32_t)tried * tried <= x) {
+            found = tried;
+        }
+    }
+    return found;
+}
+
+static uint32_t square2(uint16_t a, uint16_t b) { return (uint32_t)a * a + (uint32_t)b * b; }
+
+/* c = sqrt((1 + cos) / 2) and s = sin / 2c, Q15, of the angle from 0 to 90 degrees whose cosine and sine are as a to b. */
+static void half_of(uint16_t a, uint16_t b, int16_t half[2])
+{
+    half[0] = INT16_MAX;
+    half[1] = 0;
+    if ((a | b) == 0U) {
         return;
     }
-    while (squared < 0x40000000UL) {
-        squared <<= 2;
-        along = (uint16_t)(along << 1);
-        across = (uint16_t)(across << 1);
+    if ((a | b) >= 0x8000U) {
+        a = (uint16_t)(a >> 1);
+        b = (uint16_t)(b >> 1);
     }
-    const uint16_t inverse = inverse_sqrt_q(squared);
-    const int16_t longer = (int16_t)(((uint32_t)along * inverse) >> 16);
-    const int16_t shorter = (int16_t)(((uint32_t)across * inverse) >> 16);
-    *c = cosine < 0 ? shorter : longer;
-    *s = cosine < 0 ? longer : shorter;
-    if (sine < 0) {
-        *s = (int16_t)-*s;
+    while ((a | b) < 0x4000U) {
+        a = (uint16_t)(a << 1);
+        b = (uint16_t)(b << 1);
     }
+    const uint16_t length = root(square2(a, b));
+    const uint16_t mean = (uint16_t)(((uint32_t)length + a) >> 1);
+    const uint16_t c = root(((((uint32_t)mean << 16) - 1U) / length) << 16);
+    half[0] = (int16_t)(c >> 1);
+    half[1] = (int16_t)((((uint32_t)b << 14) / length << 16) / c);
 }
 
 static void level(const int16_t accel[3], int32_t q[4])
 {
-    int16_t a[3]; /* a quarter, so that sums fit */
-    int16_t cos_roll;
-    int16_t sin_roll;
-    int16_t cos_pitch;
-    int16_t sin_pitch;
-    uint8_t small = 1;
+    uint16_t size[3];
+    int16_t roll[2]; /* cosine and sine of the half */
+    int16_t pitch[2];
+    uint16_t largest = 0;
     for (uint8_t i = 0; i < 3; i++) {
-        if (accel[i] <= -0x2000 || accel[i] >= 0x2000) {
-            small = 0;
+        size[i] = (uint16_t)accel[i];
+        if (accel[i] < 0) {
+            size[i] = (uint16_t)(0U - size[i]);
+        }
+        largest |= size[i];
+    }
+    if (largest == 0U) {
+        return;
+    }
+    for (; largest < 0x4000U; largest = (uint16_t)(largest << 1)) {
+        for (uint8_t i = 0; i < 3; i++) {
+            size[i] = (uint16_t)(size[i] << 1);
         }
     }
-    for (uint8_t i = 0; i < 3; i++) {
-        a[i] = (int16_t)(small ? accel[i] : accel[i] >> 2);
+    half_of(size[2], size[1], roll);
+    half_of(root(square2(size[1], size[2])), size[0], pitch);
+    if (accel[2] < 0) { /* beyond 90 degrees of roll, cosine and sine change places */
+        const int16_t sine = roll[1];
+        roll[1] = roll[0];
+        roll[0] = sine;
     }
-    const uint32_t across = (uint32_t)mul16_q(a[1], a[1]) + (uint32_t)mul16_q(a[2], a[2]);
-    const uint16_t flat = sqrt_q(across);
-    half_of(a[2], a[1], flat, &cos_roll, &sin_roll);
-    half_of((int16_t)flat, (int16_t)-a[0], sqrt_q(across + (uint32_t)mul16_q(a[0], a[0])), &cos_pitch, &sin_pitch);
-    q[0] = mul16_q(cos_roll, cos_pitch);
-    q[1] = mul16_q(sin_roll, cos_pitch);
-    q[2] = mul16_q(cos_roll, sin_pitch);
-    q[3] = -mul16_q(sin_roll, sin_pitch);
+    if (accel[1] < 0) {
+        roll[1] = (int16_t)-roll[1];
+    }
+    if (accel[0] >= 0) {
+        pitch[1] = (int16_t)-pitch[1];
+    }
+    q[0] = (int32_t)roll[0] * pitch[0];
+    q[1] = (int32_t)roll[1] * pitch[0];
+    q[2] = (int32_t)roll[0] * pitch[1];
+    q[3] = -(int32_t)roll[1] * pitch[1];
 }
 
 void mahony_q_start(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *first)
 {
-    const struct mahony_q_state empty = {{ONE_Q30, 0, 0, 0}, {0}, {0}, {{0}}, {{0}}, {0}, 0, 0, 0};
-    *s = empty;
+    uint8_t *bytes = (uint8_t *)s;
+    for (uint8_t i = 0; i < sizeof *s; i++) {
+        bytes[i] = 0;
+    }
+    s->q[0] = 0x40000000L;
     level(first->accel, s->q);
     for (uint8_t i = 0; i < 3; i++) {
         s->gyro_low[i] = first->gyro[i];
@@ -72,3 +97,5 @@ void mahony_q_start(struct mahony_q_state *s, const struct mahony_q_derived *d, 
     }
     s->start_left = d->start_periods;
 }
+
+#endif

@@ -4,8 +4,6 @@
 
 #if !defined(__AVR__) || defined(FACTORLAB_PORTABLE)
 
-#define MOST_Q16 0x7FFFFFL /* of 24 bits */
-
 static int32_t load24(const uint8_t bytes[3])
 {
     return (int32_t)((uint32_t)bytes[0] << 8 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 24) >> 8;
@@ -41,12 +39,11 @@ static void rest(struct mahony_q_state *s, const struct mahony_q_derived *d, con
         still &= within_q(s->gyro_low[i], d->bias_limit >> 8);
     }
     for (uint8_t i = 0; i < 3; i++) {
-        const int32_t low = load24(s->accel_low[i]);
-        int32_t apart = (int32_t)sample->accel[i] * 256 - low;
-        apart = apart > MOST_Q16 ? MOST_Q16 : (apart < -MOST_Q16 - 1 ? -MOST_Q16 - 1 : apart);
-        const int32_t drawn = mul32u16_q(apart, weights->low);
-        store24(low + drawn, s->accel_low[i]);
-        still &= within_q(apart - drawn, d->rest_accel);
+        int32_t low = load24(s->accel_low[i]);
+        const int16_t apart = narrow_q((int32_t)sample->accel[i] - (low >> 8)); /* Q8 */
+        low += plus_q(mul16u_q(apart, weights->low), 0x80) >> 8;
+        store24(low, s->accel_low[i]);
+        still &= within_q((int32_t)sample->accel[i] - (low >> 8), d->rest_accel);
     }
     if (!still) {
         s->still = 0;
@@ -66,7 +63,9 @@ static void remember(struct mahony_q_state *s, const int16_t error[2], uint16_t 
     }
 }
 
-static uint32_t square2(int16_t a, int16_t b) { return (uint32_t)mul16_q(a, a) + (uint32_t)mul16_q(b, b); }
+static uint32_t square2(int16_t a, int16_t b)
+{
+     return (uint32_t)mul16_q(a, a) + (uint32_t)mul16_q(b, b); }
 
 /* Shortens the error to its limit; 1 if it did. */
 static uint8_t shorten(const struct mahony_q_state *s, uint16_t error_limit, int16_t error[2])
@@ -74,7 +73,7 @@ static uint8_t shorten(const struct mahony_q_state *s, uint16_t error_limit, int
     const int16_t east = (int16_t)(load24(s->lasting[0]) >> 8);
     const int16_t north = (int16_t)(load24(s->lasting[1]) >> 8);
     uint32_t squared = square2(error[0], error[1]);
-    uint16_t limit = (uint16_t)(error_limit + sqrt_q(square2(east, north)));
+    uint16_t limit = (uint16_t)(error_limit + length_q(east, north));
     if (squared <= (uint32_t)limit * limit) {
         return 0;
     }
@@ -108,15 +107,13 @@ void mahony_q_update(struct mahony_q_state *s, const struct mahony_q_derived *d,
 {
     struct rows_q rows;
     int32_t half[3];
-    int16_t u[3];
     int16_t level[2];
     int16_t e[3] = {0, 0, 0};
 
     rows_q(s->q, &rows);
     s->status = 0;
-    if (direction_q(sample->accel, u)) {
+    if (level_q(&rows, sample->accel, level)) {
         rest(s, d, sample, weights);
-        along_q(&rows, u, level);
         int16_t error[2]; /* a x up */
         error[0] = level[1];
         error[1] = (int16_t)(0U - (uint16_t)level[0]);
@@ -136,7 +133,9 @@ void mahony_q_update(struct mahony_q_state *s, const struct mahony_q_derived *d,
     for (uint8_t i = 0; i < 3; i++) {
         const int32_t gyro = within_range(sample->gyro[i], d->gyro_limit);
         const int32_t rate = up_q(minus_q(gyro, s->bias[i] >> 8), 1); /* Q25 */
-        half[i] = plus_q(mul32u24_q(rate, d->half_period), mul16u_q(e[i], gain));
+        const int32_t fine = mul16u_q((int16_t)(rate >> 16), (uint8_t)d->half_period) >> 8;
+        const int32_t turned = plus_q(mul32u16_q(rate, (uint16_t)(d->half_period >> 8)), fine); /* Q32 */
+        half[i] = plus_q(turned, mul16u_q(e[i], gain));
     }
     for (uint8_t left = weights->periods; left > 0U; left--) {
         turn_q(s->q, half, s->turn_left, rows.short_of);

@@ -4,7 +4,6 @@
 #include "fixed_q.h"
 
 #define ONE_Q28 0x10000000L
-#define MENDED 0x1000 /* 1/16, Q16: what one turn mends of the length */
 
 void rows_q(const int32_t q[4], struct rows_q *rows)
 {
@@ -25,20 +24,25 @@ void rows_q(const int32_t q[4], struct rows_q *rows)
     rows->north[1] = high16_q(up_q(minus_q(minus_q(ww, zz), minus_q(xx, yy)), 2));
     rows->north[2] = high16_q(up_q(minus_q(mul16_q(y, z), mul16_q(w, x)), 3));
     const int32_t missing = minus_q(minus_q(minus_q(minus_q(ONE_Q28, ww), xx), yy), zz);
-    rows->short_of = (int16_t)clamp_q(plus_q(missing, 0x1000) >> 13, MENDED);
+    rows->short_of = (int16_t)(plus_q(missing, 0x1000) >> 13);
 }
 
-uint8_t direction_q(const int16_t a[3], int16_t u[3])
+static int32_t dot(const int16_t a[3], const int16_t b[3])
+{
+    return plus_q(plus_q(mul16_q(a[0], b[0]), mul16_q(a[1], b[1])), mul16_q(a[2], b[2]));
+}
+
+uint8_t level_q(const struct rows_q *rows, const int16_t a[3], int16_t east_north[2])
 {
     int16_t scaled[3];
-    uint16_t largest = 0;
+    uint16_t largest = 1;
     uint32_t squared = 0;
+    if ((a[0] | a[1] | a[2]) == 0) {
+        return 0;
+    }
     for (uint8_t i = 0; i < 3; i++) {
         scaled[i] = a[i];
-        largest |= (uint16_t)(a[i] < 0 ? -(int32_t)a[i] : a[i]);
-    }
-    if (largest == 0U) {
-        return 0;
+        largest |= (uint16_t)(a[i] < 0 ? ~a[i] : a[i]);
     }
     while (largest < 0x4000U) { /* only the direction counts: use all bits */
         largest = (uint16_t)(largest << 1);
@@ -51,22 +55,25 @@ uint8_t direction_q(const int16_t a[3], int16_t u[3])
     }
     const uint8_t doubled = squared < 0x40000000UL;
     const uint16_t inverse = inverse_sqrt_q(doubled ? squared << 2 : squared);
-    for (uint8_t i = 0; i < 3; i++) {
-        const int32_t along = mul16u_q(scaled[i], inverse);
-        u[i] = high16_q(doubled ? up_q(along, 1) : along);
-    }
+    const int16_t east = high16_q(up_q(dot(rows->east, scaled), 1));
+    const int16_t north = high16_q(up_q(dot(rows->north, scaled), 1));
+    east_north[0] = high16_q(up_q(mul16u_q(east, inverse), doubled));
+    east_north[1] = high16_q(up_q(mul16u_q(north, inverse), doubled));
     return 1;
 }
 
-static int32_t dot(const int16_t a[3], const int16_t b[3])
+uint16_t length_q(int16_t a, int16_t b)
 {
-    return plus_q(plus_q(mul16_q(a[0], b[0]), mul16_q(a[1], b[1])), mul16_q(a[2], b[2]));
-}
-
-void along_q(const struct rows_q *rows, const int16_t u[3], int16_t east_north[2])
-{
-    east_north[0] = high16_q(up_q(dot(rows->east, u), 1));
-    east_north[1] = high16_q(up_q(dot(rows->north, u), 1));
+    uint16_t longer = (uint16_t)(a < 0 ? -(int32_t)a : a);
+    uint16_t shorter = (uint16_t)(b < 0 ? -(int32_t)b : b);
+    if (longer < shorter) {
+        const uint16_t swapped = longer;
+        longer = shorter;
+        shorter = swapped;
+    }
+    const uint16_t flat = (uint16_t)((254UL * longer + 49UL * shorter) >> 8);
+    const uint16_t steep = (uint16_t)((214UL * longer + 145UL * shorter) >> 8);
+    return flat > steep ? flat : steep;
 }
 
 void back_q(const struct rows_q *rows, const int16_t east_north[2], int16_t e[3])
