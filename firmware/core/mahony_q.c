@@ -21,22 +21,16 @@ static SELDOM uint16_t times(uint16_t weight, uint8_t n)
     return product > UINT16_MAX ? UINT16_MAX : (uint16_t)product;
 }
 
-/* A sample that stands for several periods. */
-static SELDOM void step_over(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
-                             uint8_t periods, uint16_t gain)
+SELDOM uint16_t mahony_q_worth(struct mahony_q_state *s, const struct mahony_q_derived *d, uint8_t periods,
+                               struct mahony_q_weights *several)
 {
-    struct mahony_q_weights weights;
-    weights.low = share(d->low_periods, periods);
-    weights.rest = share(d->constant_periods, periods);
-    weights.lasting = times(d->weights.lasting, periods);
-    weights.integral = times(d->weights.integral, periods);
-    weights.periods = periods;
-    mahony_q_update(s, d, sample, &weights, gain);
-}
-
-/* k_P while the quick start lasts. */
-static SELDOM uint16_t starting(struct mahony_q_state *s, const struct mahony_q_derived *d, uint8_t periods)
-{
+    if (periods != 1U) {
+        several->low = share(d->low_periods, periods);
+        several->rest = share(d->constant_periods, periods);
+        several->lasting = times(d->weights.lasting, periods);
+        several->integral = times(d->weights.integral, periods);
+        several->periods = periods;
+    }
     s->start_left = s->start_left > periods ? (uint16_t)(s->start_left - periods) : 0U;
     return (uint16_t)(d->gain + (uint16_t)(((uint32_t)d->boost * s->start_left) >> 8));
 }
@@ -55,12 +49,9 @@ void mahony_q_step(struct mahony_q_state *s, const struct mahony_q_derived *d, c
         s->start_left = d->start_periods;
         s->still = 0;
     } else if (periods != 0U) {
-        const uint16_t gain = s->start_left == 0U ? d->gain : starting(s, d, periods);
-        if (periods == 1U) {
-            mahony_q_update(s, d, sample, &d->weights, gain);
-        } else {
-            step_over(s, d, sample, periods, gain);
-        }
+        struct mahony_q_weights several;
+        const uint16_t gain = mahony_q_worth(s, d, periods, &several);
+        mahony_q_update(s, d, sample, periods == 1U ? &d->weights : &several, gain);
     }
 }
 

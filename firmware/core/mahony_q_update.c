@@ -1,8 +1,8 @@
 /* The arithmetic of mahony_q.h: rest, error of the accelerometer, bias, turn.  On an AVR: mahony_q_avr.c. */
+#include <stddef.h>
+
 #include "fixed_q.h"
 #include "mahony_q_parts.h"
-
-#if !defined(__AVR__) || defined(FACTORLAB_PORTABLE)
 
 static int32_t load24(const uint8_t bytes[3])
 {
@@ -87,9 +87,26 @@ static uint8_t shorten(const struct mahony_q_state *s, uint16_t error_limit, int
     return 1;
 }
 
+/* The vertical in the body's axes, Q14. */
+static void upwards(const struct rows_q *rows, int16_t up[3])
+{
+    for (uint8_t i = 0; i < 3; i++) {
+        const uint8_t j = (uint8_t)(i == 2U ? 0U : i + 1U);
+        const uint8_t k = (uint8_t)(i == 0U ? 2U : i - 1U);
+        up[i] = high16_q(up_q(
+            minus_q(mul16_q(rows->east[j], rows->north[k]), mul16_q(rows->east[k], rows->north[j])), 2));
+    }
+}
+
+/* A number times a component of the vertical, Q14. */
+static int32_t along(int32_t number, int16_t component)
+{
+    return mul32x16_q(up_q(number, 2), component);
+}
+
 /* Draws the bias to the low-passed gyro, at rest, or against the error, after the start. */
 static void learn(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct mahony_q_weights *weights,
-                  const int16_t e[3])
+                  const int16_t e[3], const int32_t more[3])
 {
     for (uint8_t i = 0; i < 3; i++) {
         if ((s->status & MAHONY_Q_REST) != 0U) { /* between two that are within the limit */
@@ -97,20 +114,30 @@ static void learn(struct mahony_q_state *s, const struct mahony_q_derived *d, co
             s->bias[i] = plus_q(s->bias[i], mul32u16_q(apart, weights->rest));
         } else if (s->start_left == 0U) {
             const int32_t change = plus_q(mul16u_q(e[i], weights->integral), 0x80) >> 8;
-            s->bias[i] = clamp_q(minus_q(s->bias[i], change), d->bias_limit);
+            s->bias[i] = clamp_q(minus_q(minus_q(s->bias[i], change), more[i]), d->bias_limit);
         }
     }
 }
 
-void mahony_q_update(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
-                     const struct mahony_q_weights *weights, uint16_t gain)
+void mahony_q_update_heading(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
+                             const struct mahony_q_weights *weights, uint16_t gain,
+                             const struct mahony_q_heading *heading)
 {
     struct rows_q rows;
-    int32_t half[3];
+    int32_t half[3] = {0, 0, 0};
+    int32_t bias[3] = {0, 0, 0};
     int16_t level[2];
     int16_t e[3] = {0, 0, 0};
 
     rows_q(s->q, &rows);
+    if (heading != NULL) {
+        int16_t up[3];
+        upwards(&rows, up);
+        for (uint8_t i = 0; i < 3; i++) {
+            half[i] = along(heading->half, up[i]);
+            bias[i] = along(heading->bias, up[i]);
+        }
+    }
     s->status = 0;
     if (level_q(&rows, sample->accel, level)) {
         rest(s, d, sample, weights);
@@ -129,13 +156,13 @@ void mahony_q_update(struct mahony_q_state *s, const struct mahony_q_derived *d,
     if (s->still >= d->rest_periods) {
         s->status |= MAHONY_Q_REST;
     }
-    learn(s, d, weights, e);
+    learn(s, d, weights, e, bias);
     for (uint8_t i = 0; i < 3; i++) {
         const int32_t gyro = within_range(sample->gyro[i], d->gyro_limit);
         const int32_t rate = up_q(minus_q(gyro, s->bias[i] >> 8), 1); /* Q25 */
         const int32_t fine = mul16u_q((int16_t)(rate >> 16), (uint8_t)d->half_period) >> 8;
         const int32_t turned = plus_q(mul32u16_q(rate, (uint16_t)(d->half_period >> 8)), fine); /* Q32 */
-        half[i] = plus_q(turned, mul16u_q(e[i], gain));
+        half[i] = plus_q(half[i], plus_q(turned, mul16u_q(e[i], gain)));
     }
     for (uint8_t left = weights->periods; left > 0U; left--) {
         turn_q(s->q, half, s->turn_left, rows.short_of);
@@ -143,4 +170,10 @@ void mahony_q_update(struct mahony_q_state *s, const struct mahony_q_derived *d,
     }
 }
 
+#ifndef __AVR__
+void mahony_q_update(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
+                     const struct mahony_q_weights *weights, uint16_t gain)
+{
+    mahony_q_update_heading(s, d, sample, weights, gain, NULL);
+}
 #endif

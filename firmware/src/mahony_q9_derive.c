@@ -1,0 +1,1 @@
+#include "../core/mahony_q9_derive.c"
