@@ -25,14 +25,14 @@ extern "C" {
 #endif
 
 struct mahony_q9_settings {
-    struct mahony_q_settings tilt;
+    struct mahony_q_settings tilt; /* of the filter without magnetometer */
     float heading_gain;    /* k_H, 1/s; at most 0.19 */
     float heading_gate;    /* rad; 3.2 and more: everything passes */
     float heading_timeout; /* s */
 };
 
 struct mahony_q9_derived {
-    struct mahony_q_derived tilt;
+    struct mahony_q_derived tilt; /* of the filter without magnetometer */
     uint16_t heading_gain;    /* k_H times half a period, Q26 */
     int16_t gate;             /* cosine of the gate, Q14 */
     uint16_t timeout_periods; /* periods */
@@ -40,7 +40,7 @@ struct mahony_q9_derived {
 };
 
 struct mahony_q9_state {
-    struct mahony_q_state tilt;
+    struct mahony_q_state tilt; /* of the filter without magnetometer */
     uint16_t field_age;   /* since the last field, periods */
     uint16_t outside;     /* the gate for so long, periods */
     uint8_t heading_known; /* 1: a field has come */
