@@ -35,6 +35,7 @@
  *   gap > `gap`                   the block ends; may have turned by half a radian a second, any way; after a
  *                                 long one (0.4 s by default) levelled by the first force
  *   dt NaN or negative            taken as 0; samples without time go into the same means
+ *   20 Hz or less                 every sample ends a block; rest and field are a sample late
  *   magnetometer NaN, zero        not in the mean; without any the heading's variance grows
  *   field that repeats bit for bit   no news: a stuck magnetometer is the same as none
  *   field vertical                no heading at the start (0 is taken), little correction after

@@ -174,3 +174,31 @@ def test_other_settings_reach_the_filter(library, rng):
     assert apart(c.world_q_body, usual.world_q_body).max() > 0.1
     difference = np.abs(c.cov - python.cov).max((1, 2)) / np.abs(python.cov).max((1, 2))
     assert difference[~c.closing].max() < 1e-3
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e-3, 1e5])
+def test_the_unit_of_the_field_does_not_matter(port, unit, rng):
+    t, angles = swinging(20.0)
+    recording = seen(t, attitude_from_angles(angles), rng=rng)
+    one, other = (
+        port.run(samples_of(recording.gyro, recording.accel, recording.mag * scale), intervals(recording))
+        for scale in (1.0, unit)
+    )
+    assert apart(one.world_q_body, other.world_q_body).max() < 0.01
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0, 20.0])
+def test_at_a_rate_at_which_every_sample_ends_a_block_it_is_as_good(port, rate, rng):
+    t, angles = swinging(60.0, rate)
+    truth = attitude_from_angles(angles)
+    c, python = both(port, seen(t, truth, rng=rng))
+    reached, due = (attitude_error(one.world_q_body, truth).degrees[0] for one in (c, python))
+    assert reached < 1.1 * due + 0.05
+
+
+@pytest.mark.parametrize("block", [0.005, 0.02, 0.25])
+def test_a_block_may_be_short_or_long(library, block, rng):
+    t, angles = swinging(20.0)
+    port = Port(library, ErrorStateAttitude(block=block))
+    c, python = both(port, seen(t, attitude_from_angles(angles), rng=rng))
+    assert np.sqrt(np.mean(apart(c.world_q_body, python.world_q_body) ** 2)) < 0.02
