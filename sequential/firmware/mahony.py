@@ -53,12 +53,13 @@ class CMahony(FirmwareFilter):
 class CMahonyFixed(FixedPointFilter):
     """`Mahony` in fixed point: firmware/core/mahony_q.c, the same bits on this machine, an M4 and an AVR.
 
+    Without a magnetometer it is the 6-D filter of the boards, with one that of firmware/core/mahony_q9.c.
+
     Parameters
     ----------
-    magnetometer : it is not used: this is the 6-D filter
+    magnetometer : use it (9-D) or not (6-D); None where `design` says nothing and the recording has one
     rate : nominal samples a second; None for those of the recording, or, sample by sample, 100
-    design : its settings; `heading_gain`, `heading_gate`, `heading_timeout` and `tilt_by_field` are not used,
-        and the order is 3
+    design : its settings; `tilt_by_field` is not used, and the order is 3
 
     Notes
     -----
@@ -71,12 +72,9 @@ class CMahonyFixed(FixedPointFilter):
     FIELDS: ClassVar[tuple[str, ...]] = (
         "gain", "integral_gain", "bias_limit", "error_limit", "lasting_time", "start_gain", "start_time",
         "rest_gyro", "rest_accel", "rest_time", "rest_constant",
+        "heading_gain", "heading_gate", "heading_timeout",
     )  # fmt: skip
-    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias", "rest")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "magnetometer", False)
+    KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias", "rest", "magnetic_disturbance")
 
     @property
     def name(self) -> str:
