@@ -12,6 +12,7 @@
 #include "../core/complementary_q_100hz.h"
 #include "../core/fixed_q.h"
 #include "../core/mahony_q.h"
+#include "../core/mahony_q9.h"
 #include "../core/mahony_q_100hz.h"
 #include "../core/tilt_q.h"
 #include "../core/tilt_q_100hz.h"
@@ -27,6 +28,7 @@
 #define MAHONY 0x04
 #define TILT 0x08
 #define COMPLEMENTARY 0x10
+#define MAHONY_9D 0x20
 
 #ifndef AGREE_SAMPLES
 #define AGREE_SAMPLES 20000UL
@@ -112,6 +114,26 @@ static void mahony_step(uint8_t first)
     add_all(q, 4);
     add_all(state.bias, 3);
     add(state.status);
+}
+
+static void mahony_9d_step(uint8_t first)
+{
+    static struct mahony_q9_derived derived; /* by the target's own floating point */
+    static struct mahony_q9_state state;
+    int32_t q[4];
+
+    if (first != 0U) {
+        struct mahony_q9_settings settings;
+
+        mahony_q_defaults_9d(&settings);
+        mahony_q_derive_9d(&settings, 100, &derived);
+        mahony_q_start_9d(&state, &derived, &sample);
+    }
+    mahony_q_step_9d(&state, &derived, &sample, first != 0U ? 0 : periods);
+    mahony_q_attitude_9d(&state, q);
+    add_all(q, 4);
+    add_all(state.tilt.bias, 3);
+    add(state.tilt.status);
 }
 
 static void tilt_step(uint8_t first)
@@ -203,6 +225,9 @@ int main(void)
     }
     if ((AGREE_MODULES & COMPLEMENTARY) != 0) {
         run("complementary_q", complementary_step);
+    }
+    if ((AGREE_MODULES & MAHONY_9D) != 0) {
+        run("mahony_q9", mahony_9d_step);
     }
     print_text("end\n");
     target_stop();

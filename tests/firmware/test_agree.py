@@ -5,7 +5,9 @@ import subprocess
 
 import pytest
 
-MODULES = {"trig_q": 1, "calibration_q": 2, "mahony_q": 4, "tilt_q": 8, "complementary_q": 16}
+MODULES = {
+    "trig_q": 1, "calibration_q": 2, "mahony_q": 4, "tilt_q": 8, "complementary_q": 16, "mahony_q9": 32,
+}  # fmt: skip
 SAMPLES, MANY = 20_000, 100_000
 FLAGS = (
     "-std=c99", "-O2", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections",
