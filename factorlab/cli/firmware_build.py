@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import click
@@ -64,4 +65,6 @@ def build(
     click.echo(f"filter  {made.filter} for {made.board}")
     click.echo(f"flash   {made.flash} B of {flash} ({made.flash / flash:.1%})")
     click.echo(f"RAM     {made.ram} B of {ram} ({made.ram / ram:.1%}), without the stack")
+    if made.board != "qemu":
+        click.echo(f"write   {shlex.join([*made.make, 'flash'])}")
     return 0

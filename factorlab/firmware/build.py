@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +30,7 @@ class Image:
     target, board, filter : what it was built for
     text, data, bss : bytes; flash takes text and data, RAM data and bss
     map : the linker's map
+    make : the command that built it; with `flash` behind, it writes the image to a board
     """
 
     path: Path
@@ -41,6 +41,7 @@ class Image:
     data: int
     bss: int
     map: Path
+    make: tuple[str, ...]
 
     @property
     def flash(self) -> int:
@@ -80,7 +81,7 @@ def build(
     Parameters
     ----------
     target : "m4" or "avr"
-    out : folder of objects and image; it may hold those of an earlier build
+    out : folder of objects, image and constants; it may hold those of an earlier build
     filter : module of firmware/core, such as "mahony_q"; the target's default unless given
     board : one of BOARDS; the emulated one unless given
     calibration : constants from counts to SI, compiled in; those of the data sheet unless given
@@ -102,17 +103,16 @@ def build(
     folder, size = PORTS[target]
     out = out.resolve()
     out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="factorlab-constants-") as scratch:
-        options = [f"OUT={out}", f"FILTER={filter}"]
-        if target == "m4":
-            options.append(f"BOARD={board}")
-        if calibration is not None:
-            options.append(f"CALIBRATION={constants_header(calibration, Path(scratch))}")
-        make = ["make", "-j2", "--no-print-directory", "-C", str(firmware_folder() / folder), *options]
-        run_tool(make, what=f"building {filter} for {board}")
+    options = [f"OUT={out}", f"FILTER={filter}"]
+    if target == "m4":
+        options.append(f"BOARD={board}")
+    if calibration is not None:
+        options.append(f"CALIBRATION={constants_header(calibration, out)}")
+    make = ["make", "-C", str(firmware_folder() / folder), *options]
+    run_tool([*make, "-j2", "--no-print-directory"], what=f"building {filter} for {board}")
     path = out / "firmware.elf"
     text, data, bss = _sizes(run_tool([size, str(path)]))
-    return Image(path, target, board, filter, text, data, bss, path.with_suffix(".map"))
+    return Image(path, target, board, filter, text, data, bss, path.with_suffix(".map"), tuple(make))
 
 
 def constants_header(calibration: ImuCalibration, folder: Path) -> Path:

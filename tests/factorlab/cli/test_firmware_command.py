@@ -52,6 +52,10 @@ def test_constants_change_the_image(tmp_path, avr_toolchain):
         assert done.exit_code == 0, done.stderr
     images = [(tmp_path / name / "firmware.elf").read_bytes() for name in ("plain", "bent")]
     assert images[0] != images[1]
+    assert f"CALIBRATION={tmp_path / 'bent' / 'calibration.h'} flash" in done.stdout, (
+        "how to write it to a board"
+    )
+    assert (tmp_path / "bent" / "calibration.h").is_file()
 
 
 @pytest.mark.parametrize(
