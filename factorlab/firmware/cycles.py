@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from factorlab.firmware.instructions import IMU_Q
 from factorlab.firmware.toolchain import firmware_folder, require_tools, run_tool
@@ -32,10 +32,12 @@ class CycleCounts:
     ----------
     cycles : (N,) of each update, call and return included; the first is the update after the start
     stack : bytes of stack that an update used at most, its return address included
+    states : (N, S) bytes of the state after each, as the AVR holds it: without gaps
     """
 
     cycles: Integers
     stack: int
+    states: NDArray[np.uint8]
 
     @property
     def mean(self) -> float:
@@ -48,13 +50,14 @@ class CycleCounts:
         return int(self.cycles.max())
 
 
-def count_cycles(module: str, samples: NDArray[np.void]) -> CycleCounts:
+def count_cycles(module: str, samples: NDArray[np.void], periods: ArrayLike | None = None) -> CycleCounts:
     """Run a filter of `firmware/core` with its constants at 100 Hz over samples, counting every update.
 
     Parameters
     ----------
     module : such as "mahony_q", with a header of constants `<module>_100hz.h`
     samples : (N,) of dtype `IMU_Q`, a period apart
+    periods : (N,) that each sample stands for; 1 unless given, 0 starts anew
 
     Raises
     ------
@@ -72,7 +75,7 @@ def count_cycles(module: str, samples: NDArray[np.void]) -> CycleCounts:
     require_tools("avr", emulate=True)
     rows = np.zeros(len(samples) + 1, ROW)
     rows["sample"] = samples[np.r_[0, np.arange(len(samples))]]
-    rows["periods"][1:] = 1
+    rows["periods"][1:] = 1 if periods is None else periods
     with tempfile.TemporaryDirectory(prefix="factorlab-cycles-") as name:
         image, given, taken = (Path(name) / one for one in ("image.elf", "rows", "answers"))
         sources = [folder / "check" / "cycles_avr.c", *sorted((folder / "core").glob("*_q*.c"))]
@@ -94,7 +97,8 @@ def count_cycles(module: str, samples: NDArray[np.void]) -> CycleCounts:
             [str(_simulator()), str(image), str(given), str(taken), str(state)], what=f"counting {module}"
         )
         answers = np.fromfile(taken, np.dtype([("cycles", "<u4"), ("stack", "<u4"), ("state", "u1", state)]))
-    return CycleCounts(answers["cycles"][1:].astype(np.int64), int(answers["stack"].max()))
+    cycles = answers["cycles"][1:].astype(np.int64)
+    return CycleCounts(cycles, int(answers["stack"].max()), answers["state"][1:])
 
 
 def _state_bytes(symbols: str) -> int:

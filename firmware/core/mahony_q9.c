@@ -47,11 +47,11 @@ static void turn_about_vertical(int32_t q[4], int32_t c, int32_t s)
 /* Turns the heading until the field points north. */
 static void set_north(int32_t q[4], const int16_t field[2])
 {
-    int32_t c = (int32_t)ONE_Q14 + field[1]; /* half of the angle, by the sum of both directions */
+    int32_t c = (int32_t)ONE_Q14 + field[1]; /* half of the angle: (1 + cos, sin), or (sin, 1 - cos) */
     int32_t s = field[0];
-    if (c < 4 && abs_q(s) < 4) {
-        c = 0;
-        s = ONE_Q14;
+    if (field[1] < 0) {
+        c = abs_q(field[0]);
+        s = field[0] < 0 ? (int32_t)field[1] - ONE_Q14 : (int32_t)ONE_Q14 - field[1];
     }
     uint32_t squared = (uint32_t)(c * c) + (uint32_t)(s * s);
     while (squared < 0x40000000UL) {
