@@ -26,22 +26,22 @@ INLINE_F32 int rest(struct mahony_f32_state *restrict s, const struct mahony_f32
     return s->at_rest > d->rest_time;
 }
 
-/* The time that the accelerometer's error counts for, doubled; less where it is longer than its limit.
+/* The time that the accelerometer's error counts for: less where it is longer than its limit.
  * A tilt error lasts in the world, a push does not. */
 INLINE_F32 float counting(struct mahony_f32_state *restrict s, const struct mahony_f32_derived *restrict d,
                           float east, float south, float dt)
 {
     const float keep = dt / (d->lasting_time + dt), squared = east * east + south * south;
-    float twice = dt + dt, lasting_east, lasting_north;
-    LOAD_PAIR_F32(s->lasting, lasting_east, lasting_north, s22, s23);
+    float lasting_east, lasting_north;
+    LOAD_PAIR_F32(s->lasting, lasting_east, lasting_north, s9, s10);
     lasting_east += (east - lasting_east) * keep;
     lasting_north -= (south + lasting_north) * keep;
-    STORE_PAIR_F32(s->lasting, lasting_east, lasting_north, s22, s23);
+    STORE_PAIR_F32(s->lasting, lasting_east, lasting_north, s9, s10);
     const float limit = d->error_limit + sqrtf(lasting_east * lasting_east + lasting_north * lasting_north);
     if (squared > limit * limit && !s->starting) {
-        twice *= limit / sqrtf(squared);
+        dt *= limit / sqrtf(squared);
     }
-    return twice;
+    return dt;
 }
 
 /* The published error of the field, m/|m| x n, which leans on roll and pitch as well. */
@@ -105,14 +105,14 @@ INLINE_F32 struct heading heading_error(struct mahony_f32_state *restrict s,
         age = OLDEST;
     }
     if (RARELY_F32(north < d->gate_ahead * length)) {
-        found.times = 2.0f * far_off(s, d, north / length, east / length, age);
+        found.times = far_off(s, d, north / length, east / length, age);
     } else {
         s->out_of_gate = 0.0f;
-        found.times = (age + age) * east / length;
+        found.times = age * east / length;
     }
     found.axis = half_up_f32(*q);
     if (RARELY_F32(d->tilt_by_field)) {
-        found.axis = published_error(rows.north, found.axis, mag);
+        found.axis = scaled_f32(published_error(rows.north, found.axis, mag), 0.5f);
         found.times = found.times != 0.0f ? age : 0.0f;
     }
     return found;
@@ -173,24 +173,25 @@ INLINE_F32 void step(struct mahony_f32_state *restrict s, const struct mahony_f3
         LOAD_VECTOR_F32(sample->mag, mag, s26, s27, s28);
         heading = heading_error(s, d, rows, mag, dt, &q);
     }
-    float kp = d->gain, kh = d->heading_gain;
+    struct vector_f32 gains; /* of tilt, heading, and both in the integral */
+    LOAD_VECTOR_F32(d->gains, gains, s27, s28, s29);
     LOAD_VECTOR_F32(s->gyro_bias, bias, s12, s13, s14);
     if (RARELY_F32(resting)) {
         bias = drawn_f32(bias, load_vector_f32(s->mean_gyro), dt / (d->rest_constant + dt));
     }
     if (RARELY_F32(s->starting)) {
-        kp += boost(s, d);
-        kh += boost(s, d);
+        gains.x += boost(s, d);
+        gains.y += boost(s, d);
     } else if (!resting) {
-        bias = minus_f32(bias, tilt, d->integral_gain * counts);
+        bias = minus_f32(bias, tilt, gains.z * counts);
         if (with_field) {
-            bias = minus_f32(bias, heading.axis, d->integral_gain * heading.times);
+            bias = minus_f32(bias, heading.axis, gains.z * heading.times);
         }
     }
     bias = limited_f32(bias, d->bias_limit, d->bias_bound);
-    struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, kp * counts);
+    struct vector_f32 r = plus_f32(scaled_f32(minus_f32(gyro, bias, 1.0f), dt), tilt, gains.x * counts);
     if (with_field) {
-        r = plus_f32(r, heading.axis, kh * heading.times);
+        r = plus_f32(r, heading.axis, gains.y * heading.times);
     }
     q = turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r)));
     STORE_ATTITUDE_F32(s->world_q_body, s->gyro_bias, q, bias, s8, s9, s10, s11, s12, s13, s14);

@@ -13,8 +13,8 @@
  * step agrees to 1e-6.  R (a x v) = (R a) x z, so that both the error and its lasting part come from two rows
  * of the rotation matrix.
  *
- * Cost: instructions on a Cortex-M4F, -O2, with and without vmla: 9-D 251/304, 6-D 189/233,
- * `mahony_f32_step_published` 104/137; firmware/budget.csv.
+ * Cost: instructions on a Cortex-M4F, -O2, with and without vmla: 9-D 249/303, 6-D 194/233,
+ * `mahony_f32_step_published` 103/136; firmware/budget.csv.
  *
  * What it does with bad input
  *   gyro NaN, infinite, above 8192 rad/s   the sample changes nothing at all
@@ -59,16 +59,14 @@ struct mahony_f32_settings {
 };
 
 struct mahony_f32_derived {
-    float gain;            /* 1/s */
-    float heading_gain;    /* 1/s */
-    float integral_gain;   /* 1/s^2 */
+    float gains[3];        /* 1/s, 1/s, 1/s^2: twice gain, heading_gain, integral_gain, as rows are halved */
     float bias_limit;      /* rad/s */
     float error_limit;     /* 1 */
     float lasting_time;    /* s */
     float gate_cosine;     /* 1, of heading_gate; -2: no gate */
     float gate_ahead;      /* 1, the same, but no less than 0 */
     float heading_timeout; /* s */
-    float boost;           /* 1/s, start_gain - gain */
+    float boost;           /* 1/s, twice start_gain - gain */
     float start_time;      /* s */
     float start_rate;      /* 1/s, 1 / start_time */
     float rest_time;       /* s */

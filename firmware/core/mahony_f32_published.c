@@ -19,10 +19,10 @@ void mahony_f32_step_published(struct mahony_f32_state *restrict s,
     LOAD_ATTITUDE_F32(s->world_q_body, s->gyro_bias, q, bias, s1, s2, s3, s4, s5, s6, s7);
     const float force = dot_f32(accel, accel);
     if (usable_f32(force)) {
-        const float times = 2.0f * dt / sqrtf(force);
+        const float times = dt / sqrtf(force);
         const struct vector_f32 error = cross_f32(accel, half_up_f32(q));
-        bias = limited_f32(minus_f32(bias, error, d->integral_gain * times), d->bias_limit, d->bias_bound);
-        r = plus_f32(r, error, d->gain * times);
+        bias = limited_f32(minus_f32(bias, error, d->gains[2] * times), d->bias_limit, d->bias_bound);
+        r = plus_f32(r, error, d->gains[0] * times);
     }
     r = minus_f32(r, bias, dt);
     q = turned_f32(q, scaled_f32(r, 0.5f + d->third * dot_f32(r, r)));

@@ -52,16 +52,16 @@ static float cosine(float angle)
 
 void mahony_f32_derive(const struct mahony_f32_settings *settings, struct mahony_f32_derived *derived)
 {
-    derived->gain = settings->gain;
-    derived->heading_gain = settings->heading_gain;
-    derived->integral_gain = settings->integral_gain;
+    derived->gains[0] = 2.0f * settings->gain;
+    derived->gains[1] = 2.0f * settings->heading_gain;
+    derived->gains[2] = 2.0f * settings->integral_gain;
     derived->bias_limit = settings->bias_limit;
     derived->error_limit = settings->error_limit;
     derived->lasting_time = settings->lasting_time;
     derived->gate_cosine = settings->heading_gate < PI ? cosine(settings->heading_gate) : -2.0f;
     derived->gate_ahead = derived->gate_cosine > 0.0f ? derived->gate_cosine : 0.0f;
     derived->heading_timeout = settings->heading_timeout;
-    derived->boost = settings->start_gain - settings->gain;
+    derived->boost = 2.0f * (settings->start_gain - settings->gain);
     derived->start_time = settings->start_time;
     derived->start_rate = settings->start_time > 0.0f ? 1.0f / settings->start_time : 0.0f;
     derived->rest_gyro = bound_f32(settings->rest_gyro);
