@@ -1,6 +1,6 @@
 """libFuzzer on every filter of the core, on its state as well as its samples, and on what keeps no state.
 
-A short run with a fixed seed here; `make -C firmware/check fuzz` goes on for as long as it is let.
+A short run with a fixed seed here; `make -C firmware/check fuzz` goes on for ten minutes each.
 """
 
 import subprocess
