@@ -53,8 +53,9 @@ def _boards() -> dict[str, str]:
     """What building, emulating and recording from a board take; none of it is needed for anything else."""
     from factorlab.firmware.toolchain import TARGETS, missing_tools
     from factorlab.versions import version_of
+    from sequential.firmware import missing
 
-    found = {}
+    found = {"C filters": missing() or "compiled"}
     for target in TARGETS:
         lacking = missing_tools(target, emulate=True)
         found[f"firmware {target}"] = (

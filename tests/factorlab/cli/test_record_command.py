@@ -289,4 +289,4 @@ def test_doctor_says_what_boards_take():
     done = CliRunner().invoke(main, ["doctor", "--json"])
     places = json.loads(done.stdout)["places"]
     assert places["serial ports"].startswith("pyserial 3")
-    assert {"firmware avr", "firmware m4"} <= set(places)
+    assert {"firmware avr", "firmware m4", "C filters"} <= set(places)
