@@ -87,6 +87,7 @@ static void correct_yaw(struct tilt_f32_state *restrict s, const float mag[3],
     } else {
         s->angle[2] = yaw;
         s->angle_variance[2] = d->heading_variance;
+        s->covariance[2] = 0.0f;
         s->heading_known = 1;
     }
 }

@@ -104,7 +104,7 @@ def step_tilt(s, w, a, m, dt, p):
         sr, cr, sp, cp = math.sin(s[0]), math.cos(s[0]), math.sin(s[1]), math.cos(s[1])
         yaw = math.atan2(m[0] * cp + (m[1] * sr + m[2] * cr) * sp, m[1] * cr - m[2] * sr)
         if s[15] == 0.0:
-            s[2], s[8], s[15] = yaw, p[3], 1.0
+            s[2], s[8], s[11], s[15] = yaw, p[3], 0.0, 1.0
         else:
             correct(s, 2, yaw, p[3], p[4])
             s[2] = wrapped(s[2])

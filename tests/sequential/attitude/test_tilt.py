@@ -69,6 +69,19 @@ def test_angles_and_biases_are_found_with_honest_sigmas(rng):
     assert np.all(np.diff(sigmas[1000:, 2]) > 0)  # nothing corrects yaw
 
 
+def test_a_field_that_comes_late_teaches_the_bias(rng):
+    """A minute without a field: the first one sets yaw, and says nothing of the drift before it."""
+    rows, bias = 12_000, 0.01
+    gyro = np.array([0.0, 0.0, bias]) + 1e-3 * rng.normal(size=(rows, 3))
+    accel = np.array([0.0, 0.0, 9.81]) + 0.05 * rng.normal(size=(rows, 3))
+    mag = np.array([0.0, 20.0, -40.0]) + 0.3 * rng.normal(size=(rows, 3))
+    mag[:6000] = np.nan
+    found = TiltKalman().estimate(ImuRecording(np.arange(rows) * 10_000_000, accel, gyro, mag))
+    assert np.abs(np.degrees(found.roll_pitch_yaw()[6000:, 2])).max() < 2.0
+    assert np.abs(found.gyro_bias[:, 2]).max() < 0.02
+    assert found.gyro_bias[-1, 2] == pytest.approx(bias, abs=1e-3)
+
+
 def test_what_is_told_about_the_body_is_told_about_the_angles(rng):
     """Compiled, against the matrices of `body_rates` on angles of every kind."""
     t, angles = swinging(8.0)
