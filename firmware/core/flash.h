@@ -7,9 +7,11 @@
 #ifdef __AVR__
 #include <avr/pgmspace.h>
 #define IN_FLASH PROGMEM
+#define FOR_ASSEMBLER __attribute__((used, externally_visible)) /* a name that link-time optimisation keeps */
 static inline uint16_t flash_u16(const uint16_t *place) { return pgm_read_word(place); }
 #else
 #define IN_FLASH
+#define FOR_ASSEMBLER
 static inline uint16_t flash_u16(const uint16_t *place) { return *place; }
 #endif
 

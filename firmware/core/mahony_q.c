@@ -1,6 +1,7 @@
 /* The step of mahony_q.h: what a sample counts for; the arithmetic is in mahony_q_update.c. */
 #include "mahony_q.h"
 
+#include "flash.h"
 #include "mahony_q_parts.h"
 
 #ifdef __GNUC__
@@ -34,14 +35,14 @@ SELDOM uint16_t mahony_q_worth(struct mahony_q_state *s, const struct mahony_q_d
     s->start_left = s->start_left > periods ? (uint16_t)(s->start_left - periods) : 0U;
     return (uint16_t)(d->gain + (uint16_t)(((uint32_t)d->boost * s->start_left) >> 8));
 }
-
-#ifdef __AVR__ /* the usual case is in mahony_q_avr.c */
+#ifdef __AVR__ /* the usual case, a sample a period, is in mahony_q_avr.c, and comes here when it is not */
 #pragma GCC optimize("Os")
 #define mahony_q_step mahony_q_step_seldom
 void mahony_q_step_seldom(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
                           uint8_t periods);
 #endif
 
+FOR_ASSEMBLER
 void mahony_q_step(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
                    uint8_t periods)
 {
