@@ -12,25 +12,26 @@
 
 #include <stddef.h>
 
-#define PLACED(type, field, at) typedef char placed_##field[offsetof(struct type, field) == (at) ? 1 : -1]
-PLACED(mahony_q_state, bias, 16);
-PLACED(mahony_q_state, gyro_low, 28);
-PLACED(mahony_q_state, accel_low, 40);
-PLACED(mahony_q_state, lasting, 49);
-PLACED(mahony_q_state, turn_left, 55);
-PLACED(mahony_q_state, status, 58);
-PLACED(mahony_q_state, start_left, 59);
-PLACED(mahony_q_state, still, 61);
-PLACED(mahony_q_derived, bias_limit, 4);
-PLACED(mahony_q_derived, rest_gyro, 8);
-PLACED(mahony_q_derived, rest_accel, 12);
-PLACED(mahony_q_derived, weights, 16);
-PLACED(mahony_q_derived, gain, 25);
-PLACED(mahony_q_derived, boost, 27);
-PLACED(mahony_q_derived, error_limit, 29);
-PLACED(mahony_q_derived, start_periods, 35);
-PLACED(mahony_q_derived, rest_periods, 37);
-PLACED(mahony_q_derived, gyro_limit, 41);
+typedef char state_is_laid_out[
+    offsetof(struct mahony_q_state, bias) == 16 &&
+    offsetof(struct mahony_q_state, gyro_low) == 28 &&
+    offsetof(struct mahony_q_state, accel_low) == 40 &&
+    offsetof(struct mahony_q_state, lasting) == 49 &&
+    offsetof(struct mahony_q_state, turn_left) == 55 &&
+    offsetof(struct mahony_q_state, status) == 58 &&
+    offsetof(struct mahony_q_state, start_left) == 59 &&
+    offsetof(struct mahony_q_state, still) == 61 ? 1 : -1];
+typedef char derived_is_laid_out[
+    offsetof(struct mahony_q_derived, bias_limit) == 4 &&
+    offsetof(struct mahony_q_derived, rest_gyro) == 8 &&
+    offsetof(struct mahony_q_derived, rest_accel) == 12 &&
+    offsetof(struct mahony_q_derived, weights) == 16 &&
+    offsetof(struct mahony_q_derived, gain) == 25 &&
+    offsetof(struct mahony_q_derived, boost) == 27 &&
+    offsetof(struct mahony_q_derived, error_limit) == 29 &&
+    offsetof(struct mahony_q_derived, start_periods) == 35 &&
+    offsetof(struct mahony_q_derived, rest_periods) == 37 &&
+    offsetof(struct mahony_q_derived, gyro_limit) == 41 ? 1 : -1];
 
 /* one statement, so that nothing comes between its lines */
 __asm__(
