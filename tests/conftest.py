@@ -3,7 +3,7 @@
 import hashlib
 import os
 import shutil
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,7 +13,6 @@ from hypothesis import settings
 
 FEW_SEEDS, ALL_SEEDS = 20, 200
 Report = TypeVar("Report", pytest.TestReport, pytest.CollectReport)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 # Kernels may compile during an example, so a deadline would measure the compiler.
 settings.register_profile("few", deadline=None, derandomize=True, max_examples=50)
@@ -69,99 +68,33 @@ def data_dir() -> Path:
 
 
 @pytest.fixture(scope="session")
-def browser() -> Path:
-    """A Chromium that can render a page without a screen."""
-    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
-    if found is None:
-        pytest.skip("needs a browser: install Debian's chromium")
-    return Path(found)
-
-
-@pytest.fixture(scope="session")
-def c_compiler() -> str:
-    """A compiler of C99."""
-    found = shutil.which("gcc") or shutil.which("cc")
-    if found is None:
-        pytest.skip("needs a C compiler: install Debian's gcc")
-    return found
-
-
-@pytest.fixture(scope="session")
-def cxx_compiler() -> str:
-    """A compiler of C++."""
-    found = shutil.which("g++") or shutil.which("c++")
-    if found is None:
-        pytest.skip("needs a C++ compiler: install Debian's g++")
-    return found
-
-
-@pytest.fixture(scope="session")
 def firmware_dir() -> Path:
     """The C sources of the firmware."""
     return Path(__file__).resolve().parents[1] / "firmware"
 
 
-@pytest.fixture(scope="session")
-def arm_toolchain() -> str:
-    """The compiler for the Cortex-M4."""
-    found = shutil.which("arm-none-eabi-gcc")
-    if found is None:
-        pytest.skip("needs the compiler for ARM: install Debian's gcc-arm-none-eabi")
-    return found
+def tool(what: str, commands: tuple[str, ...], packages: str) -> Callable[[], str]:
+    """A fixture that gives the path of the first of some commands, and skips where there is none."""
+
+    @pytest.fixture(scope="session")
+    def path() -> str:
+        found = next((path for command in commands if (path := shutil.which(command))), None)
+        if found is None:
+            pytest.skip(f"needs {what}: install Debian's {packages}")
+        return found
+
+    return path
 
 
-@pytest.fixture(scope="session")
-def avr_toolchain() -> str:
-    """The compiler for the ATmega328P."""
-    found = shutil.which("avr-gcc")
-    if found is None:
-        pytest.skip("needs the compiler for AVR: install Debian's gcc-avr and avr-libc")
-    return found
-
-
-@pytest.fixture(scope="session")
-def simavr() -> str:
-    """The emulator of the ATmega328P."""
-    found = shutil.which("simavr")
-    if found is None:
-        pytest.skip("needs the emulator of AVR: install Debian's simavr")
-    return found
-
-
-@pytest.fixture(scope="session")
-def qemu() -> str:
-    """The emulator of the Cortex-M4."""
-    found = shutil.which("qemu-system-arm")
-    if found is None:
-        pytest.skip("needs the emulator of ARM: install Debian's qemu-system-arm")
-    return found
-
-
-@pytest.fixture(scope="session")
-def cpp_compiler() -> str:
-    """A compiler of C++."""
-    found = shutil.which("g++") or shutil.which("c++")
-    if found is None:
-        pytest.skip("needs a C++ compiler: install Debian's g++")
-    return found
-
-
-@pytest.fixture(scope="session")
-def clang() -> str:
-    """The other compiler of C99, which brings libFuzzer."""
-    found = shutil.which("clang-14") or shutil.which("clang")
-    if found is None:
-        pytest.skip("needs clang: install Debian's clang-14 and libclang-rt-14-dev")
-    return found
-
-
-@pytest.fixture(scope="session")
-def cppcheck() -> str:
-    """The static analysis of C."""
-    found = shutil.which("cppcheck")
-    if found is None:
-        pytest.skip("needs the static analysis of C: install Debian's cppcheck")
-    return found
+browser = tool("a browser", ("chromium", "chromium-browser", "google-chrome"), "chromium")
+c_compiler = tool("a C compiler", ("gcc", "cc"), "gcc")
+cxx_compiler = tool("a C++ compiler", ("g++", "c++"), "g++")
+clang = tool("the compiler that brings libFuzzer", ("clang-14", "clang"), "clang and libclang-rt-dev")
+cppcheck = tool("the static analysis of C", ("cppcheck",), "cppcheck")
+arm_toolchain = tool("the compiler for ARM", ("arm-none-eabi-gcc",), "gcc-arm-none-eabi")
+avr_toolchain = tool("the compiler for AVR", ("avr-gcc",), "gcc-avr and avr-libc")
+qemu = tool("the emulator of ARM", ("qemu-system-arm",), "qemu-system-arm")
+simavr = tool("the emulator of AVR", ("simavr",), "simavr")
 
 
 # --- no silent skips: where FACTORLAB_NO_SKIP is set, a skip is a failure that gives the skip's reason ---

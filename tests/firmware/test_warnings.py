@@ -59,12 +59,12 @@ def test_every_header_stands_alone_in_c(c_compiler, tmp_path):
         subprocess.run(command, check=True)
 
 
-def test_every_header_is_taken_by_cpp(cpp_compiler, tmp_path):
+def test_every_header_is_taken_by_cpp(cxx_compiler, tmp_path):
     for header in ALONE:
         alone = tmp_path / "alone.cpp"
         alone.write_text(f'#include "{header.name}"\n#include "{header.name}"\nint alone();\n')
         warnings = ("-Wall", "-Wextra", "-Werror", "-Wno-unused-function")
-        command = [cpp_compiler, "-std=c++11", *warnings, f"-I{CORE}", "-c", str(alone), "-o", "/dev/null"]
+        command = [cxx_compiler, "-std=c++11", *warnings, f"-I{CORE}", "-c", str(alone), "-o", "/dev/null"]
         subprocess.run(command, check=True)
 
 
