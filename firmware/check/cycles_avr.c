@@ -1,7 +1,8 @@
-/* An image that lets the program around the emulator (cycles_avr_simulator.c) feed a filter and count its cycles.
+/* An image that lets the program around the emulator (cycles_avr_simulator.c) feed a filter and count its
+ * cycles.
  *
- * Port C asks for a sample, port B is high while the filter works; both are stamped with the cycle outside.  The
- * letter box's address stands in GPIOR2:GPIOR1 before the first question.  Nothing here runs on a board.
+ * Port C asks for a sample, port B is high while the filter works; both are stamped with the cycle outside.
+ * The letter box's address stands in GPIOR2:GPIOR1 before the first question.  Nothing here runs on a board.
  *
  * The filter is MODULE (mahony_q unless given), whose constants at 100 Hz are in HEADER.
  */

@@ -2,9 +2,10 @@
  *
  *     cycles_avr_simulator IMAGE.elf SAMPLES.bin ANSWERS.bin
  *
- * A sample: gyro i32 x 3, accelerometer i16 x 3, field i16 x 3, periods u8, 3 bytes of 0 (28 bytes).  An answer: cycles
- * u32, stack u32 (bytes from the call on, return address and all), then the state as the image holds it.
- * Last line on stdout: "updates <n> mean <cycles> worst <cycles> least <cycles> stack <bytes>".
+ * A sample: gyro i32 x 3, accelerometer i16 x 3, field i16 x 3, periods u8, 3 bytes of 0 (28 bytes).  An
+ * answer: cycles u32, stack u32 (bytes from the call on, return address and all), then the state as the
+ * image holds it. Last line on stdout: "updates <n> mean <cycles> worst <cycles> least <cycles> stack
+ * <bytes>".
  */
 #include <simavr/avr_ioport.h>
 #include <simavr/sim_avr.h>
@@ -102,8 +103,10 @@ int main(int argc, char **argv)
     avr_init(run.avr);
     run.avr->frequency = 16000000;
     avr_load_firmware(run.avr, &firmware);
-    avr_irq_register_notify(avr_io_getirq(run.avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_PIN0), asked, NULL);
-    avr_irq_register_notify(avr_io_getirq(run.avr, AVR_IOCTL_IOPORT_GETIRQ('B'), IOPORT_IRQ_PIN0), worked, NULL);
+    avr_irq_register_notify(avr_io_getirq(run.avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_PIN0), asked,
+                            NULL);
+    avr_irq_register_notify(avr_io_getirq(run.avr, AVR_IOCTL_IOPORT_GETIRQ('B'), IOPORT_IRQ_PIN0), worked,
+                            NULL);
     while (!run.done) {
         int state = avr_run(run.avr);
         if (state == cpu_Done || state == cpu_Crashed) {

@@ -1,7 +1,8 @@
 /* Holds the assembler products of fixed_avr.h against the C of fixed_q.h, on the target itself.
  *
- * Prints on UART 0 "products <calls> <differences>": every pair of a list of extremes, then pseudo-random operands.
- * On a machine without assembler both are one function, and the line says so by being the same.  Needs core/fixed_q.c.
+ * Prints on UART 0 "products <calls> <differences>": every pair of a list of extremes, then pseudo-random
+ * operands. On a machine without assembler both are one function, and the line says so by being the same.
+ * Needs core/fixed_q.c.
  */
 #include "../core/fixed_q.h"
 
@@ -41,7 +42,6 @@ static uint8_t differences(uint32_t a, uint32_t b)
     count = (uint8_t)(count + (mul16u_q(a16, (uint16_t)b) != mul16u_c(a16, (uint16_t)b)));
     count = (uint8_t)(count + (mulu16_q((uint16_t)a, (uint16_t)b) != mulu16_c((uint16_t)a, (uint16_t)b)));
     count = (uint8_t)(count + (mul32u16_q(a32, (uint16_t)b) != mul32u16_c(a32, (uint16_t)b)));
-    count = (uint8_t)(count + (mul32u24_q(a32, b & 0xFFFFFFUL) != mul32u24_c(a32, b & 0xFFFFFFUL)));
     if (a != 0x80000000UL) {
         count = (uint8_t)(count + (mul32x16_q(a32, b16) != mul32x16_c(a32, b16)));
         count = (uint8_t)(count + (mul32_q(a32, (int32_t)b) != mul32_c(a32, (int32_t)b)));

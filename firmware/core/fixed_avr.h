@@ -1,7 +1,8 @@
-/* The products of fixed_q.h in AVR assembler: bit for bit those of the C beside them.  Included by fixed_q.h only.
+/* The products of fixed_q.h in AVR assembler: bit for bit those of the C beside them.  Included by fixed_q.h
+ * only.
  *
- * `a0` is the lowest byte; a product of two bytes comes in r1:r0, and r1 is 0 again when gcc goes on.  What a byte
- * product adds above its own two bytes is carried to the end of the accumulator.  mulsu (signed times
+ * `a0` is the lowest byte; a product of two bytes comes in r1:r0, and r1 is 0 again when gcc goes on.  What
+ * a byte product adds above its own two bytes is carried to the end of the accumulator.  mulsu (signed times
  * unsigned) leaves the sign in the carry, and takes registers r16 to r23 only: constraint "a".
  */
 #ifndef FACTORLAB_FIXED_AVR_H
@@ -147,81 +148,6 @@ static inline __attribute__((always_inline)) int32_t mul32x16_q(int32_t a, int16
 {
     int32_t product = mul32u16_q(a, (uint16_t)b);
     return b < 0 ? (int32_t)((uint32_t)product - (uint32_t)a) : product;
-}
-
-/* a b / 2^24, rounded, b < 2^24: 70 cycles. */
-static __attribute__((noinline, unused)) int32_t mul32u24_q(int32_t a, uint32_t b)
-{
-    int32_t product;
-    uint8_t zero;
-    uint16_t below; /* bytes 1 and 2 of the product */
-    __asm__("clr  %[z]          \n\t"
-            "mul  %A[a], %A[b]  \n\t"
-            "mov  %A[t], r1     \n\t"
-            "clr  %B[t]         \n\t"
-            "mul  %B[a], %C[b]  \n\t"
-            "movw %A[p], r0     \n\t"
-            "mulsu %[h], %C[b] \n\t"
-            "movw %C[p], r0     \n\t"
-            "mul  %A[a], %B[b]  \n\t"
-            "add  %A[t], r0     \n\t"
-            "adc  %B[t], r1     \n\t" /* no carry: both were small */
-            "mul  %B[a], %A[b]  \n\t"
-            "add  %A[t], r0     \n\t"
-            "adc  %B[t], r1     \n\t"
-            "adc  %A[p], %[z]   \n\t"
-            "adc  %B[p], %[z]   \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mul  %A[a], %C[b]  \n\t"
-            "add  %B[t], r0     \n\t"
-            "adc  %A[p], r1     \n\t"
-            "adc  %B[p], %[z]   \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mul  %B[a], %B[b]  \n\t"
-            "add  %B[t], r0     \n\t"
-            "adc  %A[p], r1     \n\t"
-            "adc  %B[p], %[z]   \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mul  %C[a], %A[b]  \n\t"
-            "add  %B[t], r0     \n\t"
-            "adc  %A[p], r1     \n\t"
-            "adc  %B[p], %[z]   \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mulsu %[h], %A[b] \n\t"
-            "sbc  %C[p], %[z]   \n\t"
-            "sbc  %D[p], %[z]   \n\t"
-            "add  %A[p], r0     \n\t"
-            "adc  %B[p], r1     \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mul  %C[a], %B[b]  \n\t"
-            "add  %A[p], r0     \n\t"
-            "adc  %B[p], r1     \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mulsu %[h], %B[b] \n\t"
-            "sbc  %D[p], %[z]   \n\t"
-            "add  %B[p], r0     \n\t"
-            "adc  %C[p], r1     \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "mul  %C[a], %C[b]  \n\t"
-            "add  %B[p], r0     \n\t"
-            "adc  %C[p], r1     \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "lsl  %B[t]         \n\t"
-            "adc  %A[p], %[z]   \n\t"
-            "adc  %B[p], %[z]   \n\t"
-            "adc  %C[p], %[z]   \n\t"
-            "adc  %D[p], %[z]   \n\t"
-            "clr  r1            \n\t"
-            : [p] "=&r"(product), [z] "=&r"(zero), [t] "=&r"(below)
-            : [a] "r"(a), [h] "a"((uint8_t)((uint32_t)a >> 24)), [b] "a"(b)
-            : "r0");
-    return product;
 }
 
 /* a b / 2^32, rounded: 140 cycles with the call, for it is long (fixed_q.c). */

@@ -4,12 +4,13 @@
  * narrowed, which costs nothing on an 8-bit machine: bytes are left out.  Narrowing rounds to nearest, ties
  * upwards; what may leave its range saturates or says here why it cannot.
  *
- * Every product exists twice: in portable C (`..._c`), and, on an AVR, in assembler (fixed_avr.h); the tests hold
- * one against the other on every target.  Right shifts of negative numbers are arithmetic, as on every
+ * Every product exists twice: in portable C (`..._c`), and, on an AVR, in assembler (fixed_avr.h); the tests
+ * hold one against the other on every target.  Right shifts of negative numbers are arithmetic, as on every
  * compiler in question (gcc, clang; C99 6.5.7 leaves it to them).
  *
  * Source: own; multiplication by bytes as in Atmel's application note AVR201.
- * Cost: AVR, cycles: mul16 19, mul16u 20, mul32u16 47, mul32u24 66 (gcc's own 16x16 -> 32: 35, 64 bits: 300).
+ * Cost: AVR, cycles: mul16 19, mul16u 20, mul32u16 47 (gcc's own 16x16 -> 32: 35, 64 bits:
+ * 300).
  *
  * What it does with bad input: every function is defined for all arguments unless its comment gives a range.
  */
@@ -29,16 +30,16 @@ static inline int32_t mul16_c(int16_t a, int16_t b) { return (int32_t)a * b; }
 static inline int32_t mul16u_c(int16_t a, uint16_t b) { return (int32_t)((int64_t)a * b); }
 
 /* a b / 2^16, rounded. */
-static inline uint16_t mulu16_c(uint16_t a, uint16_t b) { return (uint16_t)(((uint32_t)a * b + 0x8000U) >> 16); }
+static inline uint16_t mulu16_c(uint16_t a, uint16_t b)
+{
+    return (uint16_t)(((uint32_t)a * b + 0x8000U) >> 16);
+}
 
 /* a b / 2^16, rounded. */
 static inline int32_t mul32u16_c(int32_t a, uint16_t b) { return (int32_t)(((int64_t)a * b + 0x8000) >> 16); }
 
 /* a b / 2^16, rounded; |a b| < 2^47 - 2^15. */
 static inline int32_t mul32x16_c(int32_t a, int16_t b) { return (int32_t)(((int64_t)a * b + 0x8000) >> 16); }
-
-/* a b / 2^24, rounded; b < 2^24. */
-static inline int32_t mul32u24_c(int32_t a, uint32_t b) { return (int32_t)(((int64_t)a * b + 0x800000) >> 24); }
 
 /* a b / 2^32, rounded; not for a = b = -2^31. */
 static inline int32_t mul32_c(int32_t a, int32_t b) { return (int32_t)(((int64_t)a * b + 0x80000000) >> 32); }
@@ -51,7 +52,6 @@ static inline int32_t mul32_c(int32_t a, int32_t b) { return (int32_t)(((int64_t
 #define mulu16_q mulu16_c
 #define mul32u16_q mul32u16_c
 #define mul32x16_q mul32x16_c
-#define mul32u24_q mul32u24_c
 #define mul32_q mul32_c
 #endif
 

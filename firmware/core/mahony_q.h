@@ -6,32 +6,33 @@
  *     else      b <- b - k_I e dt                         (not during the quick start)
  *     |b_i| <= bias_limit
  *     q <- q (x) exp((gyro - b + k_P e) dt)               third order, as q (x) (1, h (1 + |h|^2 / 3))
- * It is sequential.attitude.Mahony (the double version, same settings and defaults) with numbers of limited length;
- * mahony_q9.h adds the magnetometer.
+ * It is sequential.attitude.Mahony (the double version, same settings and defaults) with numbers of limited
+ * length; mahony_q9.h adds the magnetometer.
  *
- * Source: Mahony, Hamel, Pflimlin 2008, Nonlinear complementary filters on the special orthogonal group, eq. 32
- * and 48; limits, rest and quick start are own, see sequential/attitude/mahony.py.
+ * Source: Mahony, Hamel, Pflimlin 2008, Nonlinear complementary filters on the special orthogonal group, eq.
+ * 32 and 48; limits, rest and quick start are own, see sequential/attitude/mahony.py.
  *
- * Arithmetic.  The quaternion is Q30; a turn is half an angle, 16 bits in Q16, and what is left of it below is kept
- * for the next sample, so that its rounding does not add up.  The vertical is made of the upper 16 bits of the
- * quaternion (error 0.004 deg at most, and bounded).  The length is held by one step of Newton's a sample.
+ * Arithmetic.  The quaternion is Q30; a turn is half an angle, 16 bits in Q16, and what is left of it below
+ * is kept for the next sample, so that its rounding does not add up.  The vertical is made of the upper 16
+ * bits of the quaternion (error 0.004 deg at most, and bounded).  The length is held by one step of Newton's
+ * a sample.
  *
- * Cost: an ATmega328P takes 3 990 cycles at most on eleven recordings, 3 850 on average (assembler, mahony_q_avr.c), 4.1 kB
- * of flash, 100 bytes of stack; a Cortex-M4 1 050 instructions.  Error to the double version: 0.012 deg RMS, 0.032 deg
- * at most in eleven recordings of three minutes.
+ * Cost: an ATmega328P takes 3 990 cycles at most on eleven recordings, 3 850 on average (assembler,
+ * mahony_q_avr.c), 4.1 kB of flash, 100 bytes of stack; a Cortex-M4 1 050 instructions.  Error to the double
+ * version: 0.012 deg RMS, 0.032 deg at most in eleven recordings of three minutes.
  *
  * What it does with bad input.
- * - Accelerometer all zero: no correction, no rest; the gyro goes on.  Free fall, saturation: only the direction
- *   counts, and its effect is limited by error_limit.
- * - Gyro beyond +-gyro_limit (64 rad/s = 3 667 deg/s at 100 Hz and more): taken as that limit.  2 000 deg/s is
- *   inside.  A stuck gyro: the accelerometer holds roll and pitch, the heading drifts with what is stuck; one that
- *   is stuck within bias_limit, at rest, becomes bias.
- * - Dropped samples: `periods` says how many periods this sample stands for (1: none was dropped).  Each is turned
- *   by in turn, at a cost of its own.  Over more than a second nothing is integrated, and the quick start begins
- *   anew.  0: the first sample, nothing moves.
+ * - Accelerometer all zero: no correction, no rest; the gyro goes on.  Free fall, saturation: only the
+ *   direction counts, and its effect is limited by error_limit.
+ * - Gyro beyond +-gyro_limit (64 rad/s = 3 667 deg/s at 100 Hz and more): taken as that limit.  2 000 deg/s
+ *   is inside.  A stuck gyro: the accelerometer holds roll and pitch, the heading drifts with what is stuck;
+ *   one that is stuck within bias_limit, at rest, becomes bias.
+ * - Dropped samples: `periods` says how many periods this sample stands for (1: none was dropped).  Each is
+ *   turned by in turn, at a cost of its own.  Over more than a second nothing is integrated, and the quick
+ *   start begins anew.  0: the first sample, nothing moves.
  * - A wrong rate scales the angles between corrections: nothing here can see it.
- * - Any sample and number of periods, and any bits in the state: no undefined behaviour.  A length from 0.75 to 1.25
- *   comes back to 1 in four updates.
+ * - Any sample and number of periods, and any bits in the state: no undefined behaviour.  A length from 0.75
+ *   to 1.25 comes back to 1 in four updates.
  */
 #ifndef FACTORLAB_MAHONY_Q_H
 #define FACTORLAB_MAHONY_Q_H
@@ -105,17 +106,19 @@ struct mahony_q_state {
 /* Those of sequential.attitude.Mahony(). */
 void mahony_q_defaults(struct mahony_q_settings *settings);
 
-/* For 72 to 1 000 samples a second; settings out of range become the nearest that fit.  In single precision: an
- * AVR takes mahony_q_100hz.h instead. */
-void mahony_q_derive(const struct mahony_q_settings *settings, uint16_t rate_hz, struct mahony_q_derived *derived);
+/* For 72 to 1 000 samples a second; settings out of range become the nearest that fit.  In single
+ * precision: an AVR takes mahony_q_100hz.h instead. */
+void mahony_q_derive(const struct mahony_q_settings *settings, uint16_t rate_hz,
+                     struct mahony_q_derived *derived);
 
 /* Level by the accelerometer, yaw 0, no bias. */
-void mahony_q_start(struct mahony_q_state *state, const struct mahony_q_derived *derived, const struct imu_q *first);
+void mahony_q_start(struct mahony_q_state *state, const struct mahony_q_derived *derived,
+                    const struct imu_q *first);
 
-/* `periods` of 1 / rate_hz since the last sample: 1, or n after n - 1 that dropped out, or 0 for the first; 255
- * also stands for more. */
-void mahony_q_step(struct mahony_q_state *state, const struct mahony_q_derived *derived, const struct imu_q *sample,
-                   uint8_t periods);
+/* `periods` of 1 / rate_hz since the last sample: 1, or n after n - 1 that dropped out, or 0 for the
+ * first; 255 also stands for more. */
+void mahony_q_step(struct mahony_q_state *state, const struct mahony_q_derived *derived,
+                   const struct imu_q *sample, uint8_t periods);
 
 /* world_q_body, Q30, of length 1 within 1e-4. */
 void mahony_q_attitude(const struct mahony_q_state *state, int32_t world_q_body[4]);

@@ -95,8 +95,8 @@ static uint16_t heard(struct mahony_q9_state *s, const struct mahony_q9_derived 
 }
 
 /* What the error turns and draws, the quick start counted down. */
-static void add(const struct mahony_q9_state *s, const struct mahony_q9_derived *d, int16_t error, uint16_t stands_for,
-                uint8_t periods, struct mahony_q_heading *heading)
+static void add(const struct mahony_q9_state *s, const struct mahony_q9_derived *d, int16_t error,
+                uint16_t stands_for, uint8_t periods, struct mahony_q_heading *heading)
 {
     const uint16_t boost = (uint16_t)(((uint32_t)d->tilt.boost * s->tilt.start_left) >> 8); /* Q18 */
     const int32_t half = plus_q(mul16u_q(error, d->heading_gain) >> 8, mul16u_q(error, boost)); /* Q32 */
@@ -105,8 +105,8 @@ static void add(const struct mahony_q9_state *s, const struct mahony_q9_derived 
     heading->bias = clamp_q(change, TURNED / stands_for) * stands_for;
 }
 
-void mahony_q_step_9d(struct mahony_q9_state *s, const struct mahony_q9_derived *d, const struct imu_q *sample,
-                      uint8_t periods)
+void mahony_q_step_9d(struct mahony_q9_state *s, const struct mahony_q9_derived *d,
+                      const struct imu_q *sample, uint8_t periods)
 {
     struct rows_q rows;
     struct mahony_q_weights several;
@@ -124,13 +124,15 @@ void mahony_q_step_9d(struct mahony_q9_state *s, const struct mahony_q9_derived 
     if (stands_for != 0U) {
         add(s, d, error, stands_for, periods, &heading);
     }
-    mahony_q_update_heading(&s->tilt, &d->tilt, sample, periods == 1U ? &d->tilt.weights : &several, gain, &heading);
+    mahony_q_update_heading(&s->tilt, &d->tilt, sample, periods == 1U ? &d->tilt.weights : &several, gain,
+                            &heading);
     if (s->outside != 0U) {
         s->tilt.status |= MAHONY_Q_MAG_DISTURBED;
     }
 }
 
-void mahony_q_start_9d(struct mahony_q9_state *s, const struct mahony_q9_derived *d, const struct imu_q *first)
+void mahony_q_start_9d(struct mahony_q9_state *s, const struct mahony_q9_derived *d,
+                       const struct imu_q *first)
 {
     mahony_q_start(&s->tilt, &d->tilt, first);
     s->field_age = 0;

@@ -1,4 +1,5 @@
-/* Mahony's attitude filter with magnetometer, in fixed point: what it adds to mahony_q.h, which does the rest.
+/* Mahony's attitude filter with magnetometer, in fixed point: what it adds to mahony_q.h, which does the
+ * rest.
  *
  * Computes, with (east, north) the field's horizontal direction by the estimate, of unit length:
  *     first field: the heading is turned until the field points north
@@ -10,8 +11,8 @@
  * Cost: 5 bytes of state more.  An AVR takes C here, not assembler: some 15 000 cycles in all.
  *
  * What it does with bad input: as mahony_q.h, and
- * - field all zero (none came), or within 0.06 deg of the vertical: no correction; the next one counts for the time
- *   since the last, at most 0.2 s.  A field that never comes: the filter of mahony_q.h.
+ * - field all zero (none came), or within 0.06 deg of the vertical: no correction; the next one counts for
+ *   the time since the last, at most 0.2 s.  A field that never comes: the filter of mahony_q.h.
  * - a field out of heading_gate is a disturbance for heading_timeout, then it is believed.
  * - any length of the field: only its direction counts.
  */
@@ -50,7 +51,8 @@ struct mahony_q9_state {
 #define MAHONY_Q_MAG_DISTURBED 0x04U /* the last field was out of the gate */
 
 void mahony_q_defaults_9d(struct mahony_q9_settings *settings);
-void mahony_q_derive_9d(const struct mahony_q9_settings *settings, uint16_t rate_hz, struct mahony_q9_derived *derived);
+void mahony_q_derive_9d(const struct mahony_q9_settings *settings, uint16_t rate_hz,
+                        struct mahony_q9_derived *derived);
 void mahony_q_start_9d(struct mahony_q9_state *state, const struct mahony_q9_derived *derived,
                        const struct imu_q *first);
 void mahony_q_step_9d(struct mahony_q9_state *state, const struct mahony_q9_derived *derived,

@@ -1,8 +1,10 @@
-/* mahony_q_step, mahony_q_update and mahony_q_start in assembler for an AVR, bit for bit the C of mahony_q_update.c,
- * turning_q.c and mahony_q_start.c: the tests hold them against each other in the emulator, sample by sample.
+/* mahony_q_step, mahony_q_update and mahony_q_start in assembler for an AVR, bit for bit the C of
+ * mahony_q_update.c, turning_q.c and mahony_q_start.c: the tests hold them against each other in the
+ * emulator, sample by sample.
  *
- * gcc makes 10 000 cycles an update of that C: numbers of 32 bits do not fit its choice of registers.  Here the longest
- * update takes less than half of that; what the calls of `pieces` cost (7 cycles each) is bought with flash.
+ * gcc makes 10 000 cycles an update of that C: numbers of 32 bits do not fit its choice of registers.  Here
+ * the longest update takes less than half of that; what the calls of `pieces` cost (7 cycles each) is bought
+ * with flash.
  *
  * Offsets of the structs are those of mahony_q.h; the declarations below do not compile when they change.
  */

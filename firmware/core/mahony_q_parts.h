@@ -13,8 +13,8 @@ extern "C" {
 #endif
 
 /* One sample that stands for weights->periods > 0 periods; gain is k_P times half a period, Q18. */
-void mahony_q_update(struct mahony_q_state *state, const struct mahony_q_derived *derived, const struct imu_q *sample,
-                     const struct mahony_q_weights *weights, uint16_t gain);
+void mahony_q_update(struct mahony_q_state *state, const struct mahony_q_derived *derived,
+                     const struct imu_q *sample, const struct mahony_q_weights *weights, uint16_t gain);
 
 /* What a magnetometer adds, about the vertical. */
 struct mahony_q_heading {
@@ -24,13 +24,13 @@ struct mahony_q_heading {
 
 /* The same in C everywhere, with a heading; NULL: none. */
 void mahony_q_update_heading(struct mahony_q_state *state, const struct mahony_q_derived *derived,
-                             const struct imu_q *sample, const struct mahony_q_weights *weights, uint16_t gain,
-                             const struct mahony_q_heading *heading);
+                             const struct imu_q *sample, const struct mahony_q_weights *weights,
+                             uint16_t gain, const struct mahony_q_heading *heading);
 
-/* What a sample is worth that stands for periods != 0; `several` is where it is put unless that is 1.  Counts the
- * quick start down; gives the gain. */
-uint16_t mahony_q_worth(struct mahony_q_state *state, const struct mahony_q_derived *derived, uint8_t periods,
-                        struct mahony_q_weights *several);
+/* What a sample is worth that stands for periods != 0; `several` is where it is put unless that is 1.
+ * Counts the quick start down; gives the gain. */
+uint16_t mahony_q_worth(struct mahony_q_state *state, const struct mahony_q_derived *derived,
+                        uint8_t periods, struct mahony_q_weights *several);
 
 #ifdef __cplusplus
 }

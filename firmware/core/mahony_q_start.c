@@ -18,7 +18,8 @@ static uint16_t root(uint32_t x)
 
 static uint32_t square2(uint16_t a, uint16_t b) { return (uint32_t)a * a + (uint32_t)b * b; }
 
-/* c = sqrt((1 + cos) / 2) and s = sin / 2c, Q15, of the angle from 0 to 90 degrees whose cosine and sine are as a to b. */
+/* c = sqrt((1 + cos) / 2) and s = sin / 2c, Q15, of the angle from 0 to 90 degrees whose cosine and sine
+ * are as a to b. */
 static void half_of(uint16_t a, uint16_t b, int16_t half[2])
 {
     half[0] = INT16_MAX;

@@ -105,8 +105,8 @@ static int32_t along(int32_t number, int16_t component)
 }
 
 /* Draws the bias to the low-passed gyro, at rest, or against the error, after the start. */
-static void learn(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct mahony_q_weights *weights,
-                  const int16_t e[3], const int32_t more[3])
+static void learn(struct mahony_q_state *s, const struct mahony_q_derived *d,
+                  const struct mahony_q_weights *weights, const int16_t e[3], const int32_t more[3])
 {
     for (uint8_t i = 0; i < 3; i++) {
         if ((s->status & MAHONY_Q_REST) != 0U) { /* between two that are within the limit */
@@ -119,9 +119,9 @@ static void learn(struct mahony_q_state *s, const struct mahony_q_derived *d, co
     }
 }
 
-void mahony_q_update_heading(struct mahony_q_state *s, const struct mahony_q_derived *d, const struct imu_q *sample,
-                             const struct mahony_q_weights *weights, uint16_t gain,
-                             const struct mahony_q_heading *heading)
+void mahony_q_update_heading(struct mahony_q_state *s, const struct mahony_q_derived *d,
+                             const struct imu_q *sample, const struct mahony_q_weights *weights,
+                             uint16_t gain, const struct mahony_q_heading *heading)
 {
     struct rows_q rows;
     int32_t half[3] = {0, 0, 0};

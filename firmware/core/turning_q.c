@@ -79,7 +79,8 @@ uint16_t length_q(int16_t a, int16_t b)
 void back_q(const struct rows_q *rows, const int16_t east_north[2], int16_t e[3])
 {
     for (uint8_t i = 0; i < 3; i++) {
-        e[i] = high16_q(up_q(plus_q(mul16_q(rows->east[i], east_north[0]), mul16_q(rows->north[i], east_north[1])), 2));
+        const int32_t east = mul16_q(rows->east[i], east_north[0]);
+        e[i] = high16_q(up_q(plus_q(east, mul16_q(rows->north[i], east_north[1])), 2));
     }
 }
 

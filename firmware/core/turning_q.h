@@ -3,10 +3,11 @@
  * Computes: the first two rows of the rotation matrix, directions along them and back, small turns.
  *
  * Source: own.
- * Cost: on an AVR some 4 000 cycles together as gcc makes them; mahony_q_avr.c has its own, of the same bits.
+ * Cost: on an AVR some 4 000 cycles together as gcc makes them; mahony_q_avr.c has its own, of the same
+ * bits.
  *
- * What it does with bad input: every function is defined for all arguments.  A quaternion that is not of unit length
- * gives rows scaled by its length squared; from a length of 1.4 on they wrap.
+ * What it does with bad input: every function is defined for all arguments.  A quaternion that is not of
+ * unit length gives rows scaled by its length squared; from a length of 1.4 on they wrap.
  */
 #ifndef FACTORLAB_TURNING_Q_H
 #define FACTORLAB_TURNING_Q_H
@@ -37,8 +38,8 @@ uint16_t length_q(int16_t a, int16_t b);
 
 /* One period's turn: q (x) (1, h (1 + |h|^2 / 3)), brought back to unit length.
  *
- * `half` is half the angle, rad, Q32.  16 bits of it turn the quaternion; what is left below stays in `left`, Q24, for
- * the next time. `short_of` is the length that was missing before, Q16. */
+ * `half` is half the angle, rad, Q32.  16 bits of it turn the quaternion; what is left below stays in `left`,
+ * Q24, for the next time.  `short_of` is the length that was missing before, Q16. */
 void turn_q(int32_t q[4] /* Q30 */, const int32_t half[3], uint8_t left[3], int16_t short_of);
 
 #ifdef __cplusplus
