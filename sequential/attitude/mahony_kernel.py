@@ -48,7 +48,8 @@ def start_mahony(s, w, a):
     s[:] = 0.0
     level(s, a[0], a[1], a[2])
     for i in range(3):
-        s[10 + i], s[13 + i] = w[i], a[i]
+        s[10 + i] = w[i] if math.isfinite(w[i]) else 0.0
+        s[13 + i] = a[i] if math.isfinite(a[i]) else 0.0
 
 
 @njit(types.void(w1, f1, f1, f0, f1), **compiled)

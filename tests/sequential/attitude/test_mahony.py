@@ -19,6 +19,17 @@ def test_the_bias_is_found_at_rest_on_every_axis(rng):
     assert not found.rest[: int(1.4 * RATE)].any()
 
 
+@pytest.mark.parametrize("stream", ["gyro", "accel"])
+def test_a_first_reading_that_is_no_number_does_not_hide_rest_for_ever(stream, rng):
+    recording = still((0.3, 0.2, 0.0), 20.0, mag=False, bias=BIAS, rng=rng)
+    filt, readings = Mahony(), {name: np.array(getattr(recording, name)) for name in ("gyro", "accel")}
+    readings[stream][0] = np.nan
+    state = filt.start(readings["gyro"][0], readings["accel"][0])
+    for gyro, accel in zip(readings["gyro"][1:], readings["accel"][1:], strict=True):
+        state = filt.step(state, gyro, accel, None, 1 / RATE)
+    np.testing.assert_allclose(state[4:7], BIAS, atol=1e-3)
+
+
 def test_the_integral_finds_the_bias_in_motion(rng):
     t, angles = swinging(200.0)
     recording = seen(t, attitude_from_angles(angles), bias=BIAS, rng=rng)
