@@ -17,9 +17,10 @@
  * bits of the quaternion (error 0.004 deg at most, and bounded).  The length is held by one step of Newton's
  * a sample.
  *
- * Cost: an ATmega328P takes 3 990 cycles at most on eleven recordings, 3 850 on average (assembler,
- * mahony_q_avr.c), 4.1 kB of flash, 100 bytes of stack; a Cortex-M4 1 050 instructions.  Error to the double
- * version: 0.012 deg RMS, 0.032 deg at most in eleven recordings of three minutes.
+ * Cost: an ATmega328P takes 3 986 cycles at most on eleven recordings, 3 860 on average, 4 100 for the worst
+ * samples that we could make (assembler, mahony_q_avr.c); 4.0 kB of flash with the start and what it needs of
+ * libgcc, 97 bytes of stack.  A Cortex-M4 takes 1 050 instructions.  Error to the double version: 0.012 deg
+ * RMS, 0.032 deg at most in eleven recordings of two to three minutes.
  *
  * What it does with bad input.
  * - Accelerometer all zero: no correction, no rest; the gyro goes on.  Free fall, saturation: only the
