@@ -92,7 +92,7 @@ def _sections(found: Verification, memory: Table | None) -> list[Section]:
         Section(
             "C less Python over time",
             figure=lambda: firmware_figures.differences(found.filters),
-            caption="6-D and 9-D of a filter have the same line.",
+            caption="Whole: single precision. Broken: fixed point.",
         ),
     ]
     if memory is not None:

@@ -26,19 +26,19 @@ SMALLEST = 1e-7  # degrees that a logarithmic axis shows
 
 
 def differences(parities: Sequence[Parity]) -> Figure | None:
-    """Angle between C and Python over time, one panel a recording, logarithmic."""
-    recordings = list(dict.fromkeys(one.recording for one in parities))
-    if not recordings:
+    """Angle between C and Python over time, logarithmic: a panel a recording, 9-D and 6-D apart."""
+    panels = list(dict.fromkeys((one.recording, one.magnetometer) for one in parities))
+    if not panels:
         return None
-    figure, axes = blank(1.0 + 2.0 * len(recordings), len(recordings), 1, sharex=False)
-    for axis, recording in zip(axes[:, 0], recordings, strict=True):
-        for one in (one for one in parities if one.recording == recording):
+    figure, axes = blank(1.0 + 2.4 * len(panels), len(panels), 1, sharex=False)
+    for axis, panel in zip(axes[:, 0], panels, strict=True):
+        for one in (one for one in parities if (one.recording, one.magnetometer) == panel):
             t, apart = _highest(one.seconds, one.apart)
-            look = {**LOOKS[one.name], "linewidth": 0.9}
+            look = {**LOOKS[one.name], "linewidth": 1.1, "linestyle": "-" if not one.fixed else (0, (3, 1))}
             axis.plot(t, np.maximum(apart, SMALLEST), label=one.name, **look)
         axis.axhline(0.1, label="0.1°", **BAR)
         axis.set(ylabel="C - Python, °")
-        axis.set_title(recording)
+        axis.set_title(f"{panel[0]}, {'9-D' if panel[1] else '6-D'}")
         log_axis(axis)
     axes[-1, 0].set_xlabel("time, s")
     legend_below(figure, axes[-1, 0], columns=5)
