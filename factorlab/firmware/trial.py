@@ -16,6 +16,7 @@ from factorlab.firmware.recorded import build_host, frames_unlike, run_host
 from sequential.attitude import AttitudeHistory, attitude_from_angles
 from sequential.errors import DataError
 from sequential.evaluate import attitude_error
+from sequential.evaluate.attitude_error import AttitudeError
 from sequential.sensors import ImuCalibration, ImuRecording
 
 __all__ = ["MODELS", "Trial", "as_read", "run_trial"]
@@ -154,11 +155,20 @@ def _compared(
     model = AttitudeHistory(board.t, whole.world_q_body[there], name=model_name)
     apart = np.degrees(attitude_error(board.world_q_body, model.world_q_body).errors[:, 0])
     rows = np.clip(np.searchsorted(recording.t, board.t), 0, len(recording) - 1)
-    solved = []
-    for name, history in ((port_name, board), (model_name, model)):
-        error = None
-        if truth is not None:
-            seen, where = truth.world_q_body[rows], truth.where[rows]
-            error = attitude_error(history.world_q_body, seen, where, heading_offset="mean")
-        solved.append(Solved(name, history, 0.0, error))
+    solved = [
+        Solved(name, history, 0.0, _error(history, truth, rows))
+        for name, history in ((port_name, board), (model_name, model))
+    ]
     return Trial(image, emulation, board, model, apart, tuple(solved), unlike)
+
+
+def _error(
+    history: AttitudeHistory, truth: Reference | None, rows: NDArray[np.int64]
+) -> AttitudeError | None:
+    """Against the truth at some of its rows; None where it judges none of them (BROAD: nothing moves)."""
+    if truth is None:
+        return None
+    seen, where = truth.world_q_body[rows], truth.where[rows]
+    if not (where & np.isfinite(seen).all(axis=1)).any():
+        return None
+    return attitude_error(history.world_q_body, seen, where, heading_offset="mean")

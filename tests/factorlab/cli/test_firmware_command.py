@@ -105,6 +105,15 @@ def test_a_log_runs_on_a_board(log, target, tmp_path, avr_toolchain, arm_toolcha
     assert (tmp_path / "out" / "serial.bin").stat().st_size > 800 * 16
 
 
+def test_a_part_in_which_nothing_moves_is_not_judged(data_dir, arm_toolchain, qemu):
+    """BROAD has a truth and judges motion only, which begins after 27 s here."""
+    done = run("emulate", "broad:07", "--target", "m4", "--seconds", 4, "--json")
+    assert done.exit_code == 0, done.stderr
+    metrics = {one["metric"] for one in json.loads(done.stdout)["verdicts"]}
+    assert "from the Python filter" in metrics
+    assert "error against the truth" not in metrics
+
+
 @pytest.mark.parametrize("mode", ["angles", "text"])
 def test_angles_say_the_same(log, mode, avr_toolchain, simavr):
     options = ("--target", "avr", "--seconds", 4, "--json")
