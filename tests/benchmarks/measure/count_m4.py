@@ -1,6 +1,6 @@
 """Count the instructions of firmware filters on an emulated Cortex-M4F.
 
-    python tests/benchmarks/measure/count_m4.py mahony_f32 error_state_f32 --recording broad:07 --seconds 60 [--6d]
+    python tests/benchmarks/measure/count_m4.py mahony_f32 error_state_f32 --seconds 60 [--6d]
 
 Prints a table of mean and worst update, and bytes of code; with --map every function's.
 """
