@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -13,15 +13,27 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from factorlab.firmware.emulation import COMMANDS, PERIOD_US, Counts, Emulation, Floats, frames_of_samples
+from factorlab.firmware.emulation import PERIOD_US, Emulation, Floats, frames_of_samples
+from factorlab.firmware.recorded import FAULTS, checked_counts, checked_faults
 from factorlab.firmware.toolchain import firmware_folder, require_tools, run_tool
-from sequential.errors import DataError, ShapeError, SolverError
+from sequential.errors import DataError, SolverError
 
-__all__ = ["ABSENT", "CLOCK_HZ", "GOOD", "HUNG", "build_simulator", "emulate_avr", "live_avr"]
+__all__ = [
+    "ABSENT",
+    "CLOCK_HZ",
+    "GOOD",
+    "HUNG",
+    "build_on_simavr",
+    "build_simulator",
+    "emulate_avr",
+    "kept_folder",
+    "live_avr",
+]
 
 CLOCK_HZ = 16e6
 PERIOD_S = PERIOD_US * 1e-6
-GOOD, ABSENT, HUNG = 0, 1, 2  # what the sensor does in the period of a row
+KINDS = "good", "absent", "hung"  # what the sensor can do in the period of a row
+GOOD, ABSENT, HUNG = (FAULTS[kind] for kind in KINDS)
 RECORD = np.dtype([("cycle", "<u8"), ("row", "<u4"), ("kind", "S1"), ("value", "u1"), ("unused", "<u2")])
 Records = NDArray[np.void]
 
@@ -53,15 +65,13 @@ def emulate_avr(
     ToolMissingError
         where compiler, libsimavr or libelf are missing, or the image cannot be read.
     """
-    rows = _rows(counts)
-    if mode not in COMMANDS:
-        raise DataError(f"mode {mode!r} is none of {', '.join(COMMANDS)} ({', '.join(COMMANDS.values())})")
+    rows = checked_counts(counts, mode)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "samples").write_bytes(rows.astype("<i2").tobytes())
         options = ["--send", mode, "--who-am-i", str(who_am_i)]
         if faults is not None:
-            (folder / "faults").write_bytes(_faults(faults, len(rows)).tobytes())
+            (folder / "faults").write_bytes(checked_faults(faults, len(rows), KINDS).tobytes())
             options += ["--faults", str(folder / "faults")]
         command = [
             str(simulator or _simulator()),
@@ -138,14 +148,22 @@ def build_simulator(out: Path) -> Path:
     ToolMissingError
         where gcc, libsimavr-dev or libelf-dev are missing.
     """
-    require_tools("avr", emulate=True)
     sources = sorted((firmware_folder() / "ports" / "avr" / "simulator").glob("*.c"))
-    program = out / "simulate"
+    return build_on_simavr(sources, out / "simulate", what="compiling the simulated board")
+
+
+def build_on_simavr(sources: Sequence[Path], program: Path, *, what: str) -> Path:
+    """Compile a program of this computer on libsimavr."""
+    require_tools("avr", emulate=True)
     run_tool(
-        ["gcc", "-std=c99", "-O2", "-o", str(program), *map(str, sources), "-lsimavr", "-lelf"],
-        what="compiling the simulated board",
+        ["gcc", "-std=c99", "-O2", "-o", str(program), *map(str, sources), "-lsimavr", "-lelf"], what=what
     )
     return program
+
+
+def kept_folder() -> Path:
+    """A folder for programs that are compiled once a process."""
+    return Path(_kept().name)
 
 
 @cache
@@ -155,7 +173,7 @@ def _kept() -> tempfile.TemporaryDirectory[str]:
 
 @cache
 def _simulator() -> Path:
-    return build_simulator(Path(_kept().name))
+    return build_simulator(kept_folder())
 
 
 @contextmanager
@@ -166,7 +184,7 @@ def live_avr(image: Path, counts: ArrayLike, *, simulator: Path | None = None) -
     """
     with tempfile.TemporaryDirectory() as name:
         samples = Path(name) / "samples"
-        samples.write_bytes(_rows(counts).astype("<i2").tobytes())
+        samples.write_bytes(checked_counts(counts).astype("<i2").tobytes())
         command = [str(simulator or _simulator()), str(image), str(samples), "/dev/null", "--real-time"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as board:  # noqa: S603 - our own program
             try:
@@ -177,21 +195,3 @@ def live_avr(image: Path, counts: ArrayLike, *, simulator: Path | None = None) -
                 yield terminal
             finally:
                 board.kill()
-
-
-def _rows(counts: ArrayLike) -> Counts:
-    rows = np.asarray(counts)
-    if rows.ndim != 2 or rows.shape[1] != 7 or not len(rows):
-        raise ShapeError(f"counts must be (N, 7), ax ay az temperature gx gy gz; got {rows.shape}")
-    if not np.issubdtype(rows.dtype, np.integer) or rows.min() < -32768 or rows.max() > 32767:
-        raise DataError(f"counts must be integers of 16 bits, got {rows.dtype} up to {np.abs(rows).max():g}")
-    return rows.astype(np.int16)
-
-
-def _faults(faults: ArrayLike, count: int) -> NDArray[np.uint8]:
-    given = np.asarray(faults)
-    if given.shape != (count,) or not np.isin(given, (GOOD, ABSENT, HUNG)).all():
-        raise ShapeError(
-            f"faults must be ({count},) of {GOOD}, {ABSENT}, {HUNG}, one a row; got {given.shape}"
-        )
-    return given.astype(np.uint8)

@@ -10,16 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from factorlab.firmware.avr import build_on_simavr, kept_folder
 from factorlab.firmware.instructions import IMU_Q
-from factorlab.firmware.toolchain import firmware_folder, require_tools, run_tool
+from factorlab.firmware.toolchain import MACHINE, PLAIN, firmware_folder, require_tools, run_tool
 from sequential.errors import DataError
 
 __all__ = ["CycleCounts", "count_cycles"]
 
-FLAGS = (
-    "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-std=c99", "-O2", "-ffp-contract=off", "-ffunction-sections",
-    "-fdata-sections", "-Wall", "-Wextra", "-Wl,--gc-sections",
-)  # fmt: skip
+FLAGS = (*MACHINE["avr"], *PLAIN, "-O2", "-Wl,--gc-sections")
 ROW = np.dtype([("sample", IMU_Q), ("periods", "u1"), ("unused", "u1", 3)])
 Integers = NDArray[np.int64]
 
@@ -108,16 +106,6 @@ def _state_bytes(symbols: str) -> int:
 
 
 @functools.cache
-def _kept() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="factorlab-")
-
-
-@functools.cache
 def _simulator() -> Path:
-    program = Path(_kept().name) / "cycles"
     source = firmware_folder() / "check" / "cycles_avr_simulator.c"
-    run_tool(
-        ["gcc", "-std=c99", "-O2", str(source), "-o", str(program), "-lsimavr", "-lelf"],
-        what="compiling the cycle counter",
-    )
-    return program
+    return build_on_simavr([source], kept_folder() / "cycles", what="compiling the cycle counter")

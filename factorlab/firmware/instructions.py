@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from factorlab.firmware.toolchain import firmware_folder, require_tools, run_tool
+from factorlab.firmware.toolchain import MACHINE, PLAIN, firmware_folder, mps2, require_tools, run_tool
 from sequential.errors import DataError, SolverError
 from sequential.sensors import ImuRecording
 
@@ -20,12 +20,7 @@ __all__ = ["IMU_F32", "IMU_Q", "InstructionCounts", "count_instructions", "imu_f
 COMPILER, EMULATOR = "arm-none-eabi-gcc", "qemu-system-arm"
 IMU_F32 = np.dtype([("gyro", "<f4", 3), ("accel", "<f4", 3), ("mag", "<f4", 3)])
 IMU_Q = np.dtype([("gyro", "<i4", 3), ("accel", "<i2", 3), ("mag", "<i2", 3)])
-# the tuning makes GCC take vmla, a product and a sum with both their roundings: still the host's bits
-FLAGS = (
-    "-mcpu=cortex-m4", "-mtune=cortex-r5", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-std=c99",
-    "-fno-math-errno", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections", "-Wall",
-    "-Wextra", "-Wdouble-promotion",
-)  # fmt: skip
+FLAGS = (*MACHINE["m4"], *PLAIN, "-Wdouble-promotion")
 LINK = (
     "-nostartfiles", "-Wl,--gc-sections", "--specs=nano.specs", "--specs=nosys.specs",
 )  # fmt: skip
@@ -161,12 +156,8 @@ def _build(image: Path, core: Path, defined: list[str], optimize: str) -> None:
 
 
 def _emulate(image: Path, source: Path, sink: Path) -> None:
-    words = ",".join(f"arg={word.name}" for word in (image, source, sink))
-    emulating = [
-        EMULATOR, "-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none",
-        "-icount", "shift=10", "-semihosting-config", f"enable=on,target=native,{words}",
-        "-kernel", str(image),
-    ]  # fmt: skip
+    emulating = mps2(image, [word.name for word in (image, source, sink)])
+    emulating += ["-serial", "none", "-icount", "shift=10"]
     run_tool(emulating, cwd=image.parent, what="counting instructions")
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from factorlab.firmware.emulation import PERIOD_US, Emulation, Floats, frames_of_samples
 from factorlab.firmware.recorded import recorded_rows
-from factorlab.firmware.toolchain import require_tools, run_tool
+from factorlab.firmware.toolchain import mps2, require_tools, run_tool
 from sequential.errors import DataError, SolverError
 
 __all__ = ["CLOCK_HZ", "emulate_m4", "live_m4", "run_mps2", "tick_periods"]
@@ -103,9 +103,8 @@ def _times(periods: Periods, empty: np.void, size: int, count: int) -> tuple[Flo
 def _on_the_line(periods: Periods, first: Floats, size: int) -> Floats:
     """(B,) when bytes leave: those of a period one after the other, at the line's rate."""
     sent = np.append(periods["sent"], size).astype(np.int64)
-    byte_s: Floats = np.arange(size, dtype=np.float64) * (
-        10.0 / BAUD
-    )  # what leaves before the first period, the boot frame
+    # what leaves before the first period: the boot frame
+    byte_s: Floats = np.arange(size, dtype=np.float64) * (10.0 / BAUD)
     for start, begin, end in zip(first, sent[:-1], sent[1:], strict=True):
         byte_s[begin:end] = start + np.arange(end - begin) * (10.0 / BAUD)
     return byte_s
@@ -198,8 +197,4 @@ def live_m4(image: Path, counts: ArrayLike) -> Iterator[str]:
 
 def _qemu(image: Path, command: str) -> list[str]:
     """All but the serial line and the time; the rows and the log lie in the folder where it runs."""
-    words = ",".join(f"arg={word}" for word in ("firmware", "rows", "log", command) if word)
-    return [
-        EMULATOR, "-M", "mps2-an386", "-display", "none", "-monitor", "none",
-        "-semihosting-config", f"enable=on,target=native,{words}", "-kernel", str(image.resolve()),
-    ]  # fmt: skip
+    return mps2(image, [word for word in ("firmware", "rows", "log", command) if word])

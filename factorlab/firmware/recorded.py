@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from factorlab.firmware.emulation import COMMANDS, Emulation
+from factorlab.firmware.emulation import COMMANDS, Counts, Emulation
 from factorlab.firmware.toolchain import firmware_folder, run_tool
 from sequential.errors import DataError, ShapeError
 from sequential.readers.serial import BootFrame, Frame, decode
 
-__all__ = ["FAULTS", "ROW", "build_host", "frames_unlike", "recorded_rows", "run_host"]
+__all__ = [
+    "FAULTS",
+    "ROW",
+    "build_host",
+    "checked_counts",
+    "checked_faults",
+    "frames_unlike",
+    "recorded_rows",
+    "run_host",
+]
 
 ROW = np.dtype([("counts", "<i2", 7), ("answer", "u1"), ("command", "u1")])
 FAULTS = {"good": 0, "absent": 1, "hung": 2, "bus": 3}
@@ -35,21 +45,48 @@ def recorded_rows(counts: ArrayLike, *, mode: str, faults: ArrayLike | None = No
     ShapeError, DataError
         where they are something else.
     """
+    given = checked_counts(counts, mode)
+    rows = np.zeros(len(given), ROW)
+    rows["counts"] = given
+    if faults is not None:
+        rows["answer"] = checked_faults(faults, len(given))
+    return rows
+
+
+def checked_counts(counts: ArrayLike, mode: str = "q") -> Counts:
+    """(N, 7) int16 rows for an emulated board, and a mode that it knows.
+
+    Raises
+    ------
+    ShapeError, DataError
+        where they are something else.
+    """
     given = np.asarray(counts)
     if given.ndim != 2 or given.shape[1] != 7 or not len(given):
         raise ShapeError(f"counts must be (N, 7), ax ay az temperature gx gy gz; got {given.shape}")
     if not np.issubdtype(given.dtype, np.integer) or given.min() < -32768 or given.max() > 32767:
-        raise DataError(f"counts must be integers of 16 bits, got {given.dtype}")
+        raise DataError(
+            f"counts must be integers of 16 bits, got {given.dtype} up to {np.abs(given).max():g}"
+        )
     if mode not in COMMANDS:
         raise DataError(f"mode {mode!r} is none of {', '.join(COMMANDS)} ({', '.join(COMMANDS.values())})")
-    rows = np.zeros(len(given), ROW)
-    rows["counts"] = given
-    if faults is not None:
-        kinds = np.asarray(faults)
-        if kinds.shape != (len(given),) or not np.isin(kinds, list(FAULTS.values())).all():
-            raise ShapeError(f"faults must be ({len(given)},) of 0 to 3, one a row; got {kinds.shape}")
-        rows["answer"] = kinds
-    return rows
+    return given.astype(np.int16)
+
+
+def checked_faults(faults: ArrayLike, count: int, kinds: Iterable[str] = FAULTS) -> NDArray[np.uint8]:
+    """(N,) of the numbers that FAULTS gives some kinds.
+
+    Raises
+    ------
+    ShapeError
+        where they are something else.
+    """
+    given, known = np.asarray(faults), [FAULTS[kind] for kind in kinds]
+    if given.shape != (count,) or not np.isin(given, known).all():
+        raise ShapeError(
+            f"faults must be ({count},) of {', '.join(map(str, known))}, one a row; got {given.shape}"
+        )
+    return given.astype(np.uint8)
 
 
 def build_host(

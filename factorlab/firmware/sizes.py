@@ -10,27 +10,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from factorlab.firmware.stack import call_graph, deepest, frames
-from factorlab.firmware.toolchain import firmware_folder, require_tools, run_tool
+from factorlab.firmware.toolchain import MACHINE, PLAIN, firmware_folder, require_tools, run_tool
 
 __all__ = ["Sizes", "module_sizes"]
 
-STRICT = (
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-ffp-contract=off",
-    "-ffunction-sections",
-    "-fdata-sections",
-    "-fstack-usage",
-)
-M4 = (
-    "-mcpu=cortex-m4", "-mtune=cortex-r5", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16",
-    "-fno-math-errno", "-O2",
-)  # fmt: skip
-AVR = ("-mmcu=atmega328p", "-DF_CPU=16000000UL", "-O2")
+STRICT = (*PLAIN, "-fstack-usage")
 ALONE = ("-nostartfiles", "--specs=nano.specs", "--specs=nosys.specs", "-Wl,-e,main")
-# compiler and its tools, flags, what links without a port around it
-TARGETS = {"m4": ("arm-none-eabi-", M4, ALONE), "avr": ("avr-", AVR, ())}
+# compiler and its tools, what links without a port around it
+TARGETS = {"m4": ("arm-none-eabi-", ALONE), "avr": ("avr-", ())}
 KEPT = r"^ \.(?:text|rodata|progmem|data)[.\w]*\s+0x([0-9a-f]+)\s+0x([0-9a-f]+)\s+(\S+\.o)$"
 PLACED = re.compile(KEPT, re.MULTILINE)
 
@@ -59,7 +46,7 @@ def module_sizes(
     module: str,
     target: str,
     *,
-    optimize: str | None = None,
+    optimize: str = "-O2",
     step: str | None = None,
     state: str | None = None,
 ) -> Sizes:
@@ -69,7 +56,7 @@ def module_sizes(
     ----------
     module : a filter of `firmware/core` with its suffix, such as "mahony_q"
     target : "m4" or "avr"
-    optimize : flag of the compiler; -O2 unless given
+    optimize : flag of the compiler
     step, state : names, where the module departs from `<module>_step` and `<module>_state`
 
     Raises
@@ -78,9 +65,9 @@ def module_sizes(
         where the compiler is missing, or refuses.
     """
     require_tools(target)
-    prefix, flags, link = TARGETS[target]
+    prefix, link = TARGETS[target]
     step, state = step or f"{module}_step", state or f"{module}_state"
-    built = _objects(target, optimize or flags[-1])
+    built = _objects(target, optimize)
     with tempfile.TemporaryDirectory(prefix="factorlab-sizes-") as name:
         folder = Path(name)
         (folder / "stub.c").write_text(_stub(module, step, state), encoding="utf-8")
@@ -105,9 +92,9 @@ class _Objects(NamedTuple):
 
 @functools.cache
 def _objects(target: str, optimize: str) -> _Objects:
-    prefix, flags, _ = TARGETS[target]
+    prefix, _ = TARGETS[target]
     core = firmware_folder() / "core"
-    compiler = (f"{prefix}gcc", *STRICT, *flags[:-1], optimize, f"-I{core}")
+    compiler = (f"{prefix}gcc", *STRICT, *MACHINE[target], optimize, f"-I{core}")
     held = tempfile.TemporaryDirectory(prefix="factorlab-core-")
     sources = [str(path) for path in sorted(core.glob("*.c"))]
     run_tool([*compiler, "-c", *sources], cwd=Path(held.name), what=f"compiling the core for {target}")

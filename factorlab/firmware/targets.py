@@ -6,16 +6,12 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from factorlab.firmware.build import build, filters_of
+from factorlab.firmware.build import Image, build, filters_of
 from factorlab.firmware.emulation import Counts, Emulation
-from factorlab.firmware.recorded import build_host, run_host
+from factorlab.firmware.recorded import build_host, frames_unlike, run_host
 from factorlab.firmware.toolchain import TARGETS, missing_tools
-from sequential.readers.serial import QuaternionFrame, decode
 
-__all__ = ["TargetParity", "every_target", "target_parity"]
+__all__ = ["TargetParity", "emulate", "every_target", "target_parity"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,28 +60,17 @@ def target_parity(name: str, target: str, counts: Counts) -> TargetParity:
         return TargetParity(name, target, len(counts), None, lacking)
     with tempfile.TemporaryDirectory(prefix="factorlab-parity-") as scratch:
         image = build(target, Path(scratch, target), filter=name)
-        emulation = _emulate(target, image.path, counts)
-        host = decode(run_host(build_host(Path(scratch, "host"), filter=name), counts))
-    here = [frame for frame in host if isinstance(frame, QuaternionFrame)][-len(counts) :]
-    board = [frame if isinstance(frame, QuaternionFrame) else None for frame in emulation.frames]
-    differing = sum(one is None or not _same(one, other) for one, other in zip(board, here, strict=True))
-    return TargetParity(name, target, len(counts), differing)
+        emulation = emulate(image, counts)
+        host = run_host(build_host(Path(scratch, "host"), filter=name), counts)
+    return TargetParity(name, target, len(counts), emulation.lost + frames_unlike(emulation, host))
 
 
-def _emulate(target: str, image: Path, counts: NDArray[np.int16]) -> Emulation:
-    if target == "avr":
+def emulate(image: Image, counts: Counts, mode: str = "q") -> Emulation:
+    """Run an image in the emulator of its target; see `emulate_avr` and `emulate_m4`."""
+    if image.target == "avr":
         from factorlab.firmware.avr import emulate_avr
 
-        return emulate_avr(image, counts)
+        return emulate_avr(image.path, counts, mode=mode)
     from factorlab.firmware.m4 import emulate_m4
 
-    return emulate_m4(image, counts)
-
-
-def _same(one: QuaternionFrame, other: QuaternionFrame) -> bool:
-    """All that the filter says; the number and the time of a frame are the board's own."""
-    return (
-        tuple(one.world_q_body) == tuple(other.world_q_body)
-        and tuple(one.bias) == tuple(other.bias)
-        and one.status == other.status
-    )
+    return emulate_m4(image.path, counts, mode=mode)

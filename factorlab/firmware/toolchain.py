@@ -4,13 +4,34 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 from sequential.errors import ToolMissingError
 from sequential.firmware import source_folder
 
-__all__ = ["PACKAGES", "TARGETS", "firmware_folder", "missing_tools", "require_tools", "run_tool"]
+__all__ = [
+    "MACHINE",
+    "PACKAGES",
+    "PLAIN",
+    "TARGETS",
+    "firmware_folder",
+    "missing_tools",
+    "mps2",
+    "require_tools",
+    "run_tool",
+]
 
+# flags of the compilers, as in the Makefiles of firmware/ports; the M4's tuning makes GCC take vmla, a
+# product and a sum with both their roundings: still the host's bits
+MACHINE = {
+    "m4": (
+        "-mcpu=cortex-m4", "-mtune=cortex-r5", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16",
+        "-fno-math-errno",
+    ),
+    "avr": ("-mmcu=atmega328p", "-DF_CPU=16000000UL"),
+}  # fmt: skip
+PLAIN = ("-std=c99", "-Wall", "-Wextra", "-ffp-contract=off", "-ffunction-sections", "-fdata-sections")
 # command: Debian package that brings it
 PACKAGES = {
     "make": "make",
@@ -100,6 +121,15 @@ def run_tool(command: list[str], *, cwd: Path | None = None, what: str = "", pat
         reason = next((line for line in lines if "error" in line.lower()), lines[-1])
         raise ToolMissingError(f"{what or command[0]} failed: {reason}")
     return done.stdout
+
+
+def mps2(image: Path, words: Iterable[str]) -> list[str]:
+    """QEMU's command for an image and its arguments; all but the serial line and the time."""
+    arguments = ",".join(f"arg={word}" for word in words)
+    return [
+        "qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-monitor", "none",
+        "-semihosting-config", f"enable=on,target=native,{arguments}", "-kernel", str(image.resolve()),
+    ]  # fmt: skip
 
 
 def _package(wanted: str) -> str:

@@ -13,6 +13,7 @@ from factorlab.attitude import Reference, Solved
 from factorlab.firmware.build import Image, build, constants_header
 from factorlab.firmware.emulation import Emulation, mpu6050_counts
 from factorlab.firmware.recorded import build_host, frames_unlike, run_host
+from factorlab.firmware.targets import emulate
 from sequential.attitude import AttitudeHistory, attitude_from_angles
 from sequential.errors import DataError
 from sequential.evaluate import attitude_error
@@ -23,12 +24,12 @@ __all__ = ["MODELS", "Trial", "as_read", "run_trial"]
 
 Array = NDArray[np.float64]
 PERIOD_NS = 10_000_000
-# module of the firmware: the Python filter, and the C filter by its name on the command line
+# module of the firmware: the Python filter; with c- before it, and -q behind it in fixed point, the C filter
 MODELS = {
-    "mahony": ("mahony", "c-mahony"),
-    "tilt": ("kalman", "c-kalman"),
-    "complementary": ("complementary", "c-complementary"),
-    "error_state": ("error-state", "c-error-state"),
+    "mahony": "mahony",
+    "tilt": "kalman",
+    "complementary": "complementary",
+    "error_state": "error-state",
 }
 
 
@@ -86,7 +87,7 @@ def run_trial(
     with tempfile.TemporaryDirectory(prefix="factorlab-image-") as scratch:
         made = build(target, image or Path(scratch), filter=filter, calibration=calibration)
         counts = mpu6050_counts(recording)
-        emulation = _emulate(made, counts, mode)
+        emulation = emulate(made, counts, mode)
         constants = None if calibration is None else constants_header(calibration, Path(scratch))
         host = build_host(Path(scratch) / "host", filter=made.filter, calibration=constants)
         unlike = frames_unlike(emulation, run_host(host, counts, mode=mode))
@@ -99,16 +100,6 @@ def run_trial(
     board = AttitudeHistory(t[there], path[there] / np.where(norms > 0, norms, 1.0), name=made.filter)
     read = as_read(counts, t, recording.name, calibration)
     return _compared(made, emulation, board, read, there, truth, recording, unlike)
-
-
-def _emulate(image: Image, counts: NDArray[np.int16], mode: str) -> Emulation:
-    if image.target == "avr":
-        from factorlab.firmware.avr import emulate_avr
-
-        return emulate_avr(image.path, counts, mode=mode)
-    from factorlab.firmware.m4 import emulate_m4
-
-    return emulate_m4(image.path, counts, mode=mode)
 
 
 def as_read(
@@ -149,8 +140,8 @@ def _compared(
     module, _, kind = image.filter.rpartition("_")
     if module not in MODELS:
         return Trial(image, emulation, board, None, None, (), unlike)
-    model_name, port_name = MODELS[module]
-    port_name += "-q" if kind == "q" else ""
+    model_name = MODELS[module]
+    port_name = f"c-{model_name}-q" if kind == "q" else f"c-{model_name}"
     whole = make_estimator(model_name).estimate(read)
     model = AttitudeHistory(board.t, whole.world_q_body[there], name=model_name)
     apart = np.degrees(attitude_error(board.world_q_body, model.world_q_body).errors[:, 0])

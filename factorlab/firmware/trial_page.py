@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.firmware.build import FLASH
+from factorlab.firmware.parity import BAR
 from factorlab.firmware.trial import Trial
 from factorlab.report.document import Document, Section, Status, Table, Verdict
 
@@ -19,7 +20,7 @@ LATENCY_US, JITTER_US = {"q": 500.0, "a": 1000.0, "t": 1000.0, "r": 500.0}, 8.0
 QUICK = {"mahony_q", "none"}  # whose latency has a bar
 SLOW = "send quaternions, or lower PHASE_UPDATE_US in the port's Makefile"
 LATE = "raise PHASE_UPDATE_US in the port's Makefile above the longest update"
-APART = (0.1, 0.3)  # degrees from the Python filter, root mean square and largest
+APART = BAR[1:]  # degrees from the Python filter, root mean square and largest
 ROWS = 200  # of the trajectory in the JSON document
 UNIT = {"avr": "cycles", "m4": "instructions"}
 NAMES = {"q": "quaternion frames", "a": "angle frames", "t": "text lines", "r": "raw frames"}
@@ -60,17 +61,7 @@ def _verdicts(trial: Trial) -> list[Verdict]:
         meaning = f"root mean square over the recording; largest {worst:.3f}°"
         status = "PASS" if good else "WARN"
         action = "" if good else "factorlab firmware verify says which module departs"
-        found.append(
-            Verdict(
-                "from the Python filter",
-                rms,
-                (0.0, APART[0]),
-                "PASS" if good else "WARN",
-                meaning,
-                action,
-                "°",
-            )
-        )
+        found.append(Verdict("from the Python filter", rms, (0.0, APART[0]), status, meaning, action, "°"))
     if (error := _error(trial)) is not None:
         total, heading, inclination = error
         meaning = f"heading {heading:.2f}°, inclination {inclination:.2f}°, mean heading offset off"

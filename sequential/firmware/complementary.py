@@ -33,11 +33,6 @@ class CComplementary(FirmwareFilter):
     SHARES_STATE: ClassVar[bool] = True
 
     @property
-    def name(self) -> str:
-        """c-complementary."""
-        return "c-complementary"
-
-    @property
     def reference(self) -> ComplementaryAttitude:
         """The Python filter."""
         return self.design
@@ -63,11 +58,6 @@ class CComplementaryFixed(FixedPointFilter):
 
     ENTRY: ClassVar[str] = "complementary_q"
     FIELDS: ClassVar[tuple[str, ...]] = ("time_constant", "heading_time_constant")
-
-    @property
-    def name(self) -> str:
-        """c-complementary-q."""
-        return "c-complementary-q"
 
     @property
     def reference(self) -> ComplementaryAttitude:

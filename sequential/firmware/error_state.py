@@ -39,11 +39,6 @@ class CErrorState(FirmwareFilter):
     )  # fmt: skip
 
     @property
-    def name(self) -> str:
-        """c-error-state."""
-        return "c-error-state"
-
-    @property
     def reference(self) -> ErrorStateAttitude:
         """The Python filter."""
         return self.design

@@ -54,6 +54,11 @@ class FirmwareFilter(AttitudeFilter):
         """The Python filter that this one is a port of, with the same settings."""
 
     @property
+    def name(self) -> str:
+        """That of the Python filter after c-."""
+        return f"c-{self.reference.name}"
+
+    @property
     def settings(self) -> Array:
         """What the binding takes, in the order of FIELDS."""
         return np.array([float(getattr(self.reference, name)) for name in self.FIELDS])
@@ -104,6 +109,11 @@ class FixedPointFilter(FirmwareFilter):
         super().__post_init__()
         if self.rate is not None and not RATES[0] <= self.rate <= RATES[1]:
             raise ModelError(f"rate is {RATES[0]} to {RATES[1]} samples a second, got {self.rate}")
+
+    @property
+    def name(self) -> str:
+        """That of the Python filter between c- and -q."""
+        return f"c-{self.reference.name}-q"
 
     def _rate(self, recording: ImuRecording | None) -> float:
         """A whole number, so that the periods of slow recordings are counted several at a time."""

@@ -38,11 +38,6 @@ class CMahony(FirmwareFilter):
     SHARES_STATE: ClassVar[bool] = True
 
     @property
-    def name(self) -> str:
-        """c-mahony."""
-        return "c-mahony"
-
-    @property
     def reference(self) -> Mahony:
         """The Python filter."""
         return self.design
@@ -75,11 +70,6 @@ class CMahonyFixed(FixedPointFilter):
         "heading_gain", "heading_gate", "heading_timeout",
     )  # fmt: skip
     KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias", "rest", "magnetic_disturbance")
-
-    @property
-    def name(self) -> str:
-        """c-mahony-q."""
-        return "c-mahony-q"
 
     @property
     def reference(self) -> Mahony:

@@ -46,11 +46,6 @@ class CTiltKalman(FirmwareFilter):
     SHARES_STATE: ClassVar[bool] = True
 
     @property
-    def name(self) -> str:
-        """c-kalman."""
-        return "c-kalman"
-
-    @property
     def reference(self) -> TiltKalman:
         """The Python filter."""
         return self.design
@@ -84,11 +79,6 @@ class CTiltKalmanFixed(FixedPointFilter):
     ENTRY: ClassVar[str] = "tilt_q"
     FIELDS: ClassVar[tuple[str, ...]] = (*FIELDS, "bias_limit")
     KNOWS: ClassVar[tuple[str, ...]] = ("world_q_body", "gyro_bias")
-
-    @property
-    def name(self) -> str:
-        """c-kalman-q."""
-        return "c-kalman-q"
 
     @property
     def reference(self) -> TiltKalman:
