@@ -63,6 +63,7 @@ bench: $(VENV)/installed-test warm
 # Every kernel is compiled once per machine; doing it here keeps the wait out of the first real run.
 warm: | $(VENV)/installed
 	@$(BIN)/python -m sequential.warm_up
+	@$(BIN)/python -m vision3d.warm_up
 
 $(VENV)/bin/python:
 	@echo "creating $(VENV)"
