@@ -14,6 +14,8 @@ PACKAGES := chromium gcc g++ make \
 	avr-gcc:gcc-avr /usr/lib/avr/include/avr/io.h:avr-libc simavr /usr/include/simavr/sim_avr.h:libsimavr-dev \
 	/usr/include/libelf.h:libelf-dev /usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h:arduino-core-avr \
 	cppcheck clang /usr/lib/llvm-*/lib/clang/*/include/fuzzer:libclang-rt-dev
+# what looks at images
+VISION_TESTS := tests/vision3d
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -22,11 +24,12 @@ pip_install = if [ -x $(BIN)/pip ]; then $(BIN)/python -m pip install $(PIP_FLAG
 	else $(PYTHON) -m pip --python $(BIN)/python install $(PIP_FLAGS) $(1); fi
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test packages check bench warm clean
+.PHONY: help demo test test-opencv4 packages check bench warm clean
 
 help:
 	@echo "make demo    install, then compare filters and smoothers on a real drive; ends with the report's path"
 	@echo "make test    install everything, then run the whole suite"
+	@echo "make test-opencv4  tests of images and cameras once more, on OpenCV 4"
 	@echo "make check   lint, format, types and import contracts"
 	@echo "make bench   every benchmark, and the slow tests with all their seeds"
 	@echo "make clean   remove .venv, builds and caches"
@@ -38,6 +41,11 @@ demo: $(VENV)/installed
 
 test: packages $(VENV)/installed-test warm
 	@$(ONE_THREAD) $(BIN)/python -m pytest -n 2 $(PYTEST_ARGS)
+
+# OpenCV 4 lies beside the environment's OpenCV 5: what touches images runs on both
+test-opencv4: $(VENV)/installed-test warm
+	@[ -d $(VENV)/opencv4/cv2 ] || { $(call pip_install,--no-deps --target $(VENV)/opencv4 'opencv-python-headless==4.14.*'); }
+	@PYTHONPATH=$(VENV)/opencv4 $(ONE_THREAD) $(BIN)/python -m pytest -n 2 $(VISION_TESTS)
 
 packages:
 	@.ci/debian-packages $(PACKAGES)
