@@ -1,0 +1,122 @@
+"""Where a distortion ceases to be one-to-one: past its fold, one pixel is the image of several rays.
+
+A fitted polynomial says nothing about where there were no corners: a high order or a pole of the rational
+model may turn the image inside out within its own borders.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from vision3d.lenses import LENSES
+
+if TYPE_CHECKING:
+    from vision3d.camera import Array, Camera
+
+__all__ = ["Fold", "check_monotonic", "radial_limit"]
+
+IMAGINARY_MAX = 1e-9
+"""Imaginary part, relative, of a root that is taken for real."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """Whether, and where, a distortion folds.
+
+    Parameters
+    ----------
+    radius_px : distance from the principal point at which the radial part folds, px; inf where nowhere
+    angle_rad : angle of that ray from the optical axis, rad; inf where there is none
+    inside : whether some pixel of the image has no ray
+    lost : share of the image's pixels without a ray, 0 to 1
+    """
+
+    radius_px: float
+    angle_rad: float
+    inside: bool
+    lost: float
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.radius_px):
+            return "the distortion is one-to-one everywhere"
+        where = (
+            f"{self.radius_px:.0f} px from the principal point ({np.degrees(self.angle_rad):.1f}° off axis)"
+        )
+        if not self.inside:
+            return f"the distortion folds {where}, outside the image"
+        return (
+            f"the distortion folds {where}, inside the image: {100.0 * self.lost:.1f} % of pixels have no "
+            "ray; calibrate with corners in the corners of the image, or with fewer coefficients"
+        )
+
+
+def radial_limit(lens: str, parameters: Array) -> float:
+    """Smallest radius x/z (fisheye: angle, rad) at which the image radius ceases to grow; inf where none.
+
+    Parameters
+    ----------
+    lens : name of the lens
+    parameters : (4+k,) intrinsics and distortion
+    """
+    k = dict(zip(_names(lens), parameters[4:], strict=True))
+    if lens == "fisheye4":
+        slope = Polynomial([1.0, *((2 * i + 1) * k[f"k{i}"] for i in range(1, 5))])
+        return float(np.sqrt(min(_first_sign_change(slope), np.pi**2)))
+    top = Polynomial([1.0, *(k.get(f"k{i}", 0.0) for i in range(1, 4))])
+    under = Polynomial([1.0, *(k.get(f"k{i}", 0.0) for i in range(4, 7))])
+    s = Polynomial([0.0, 1.0])
+    # d(r g)/dr = (N D + 2 s (N' D - N D')) / D², with s = r² and g = N / D
+    slope = top * under + 2.0 * s * (top.deriv() * under - top * under.deriv())
+    return float(np.sqrt(min(_first_sign_change(slope), _first_sign_change(under))))
+
+
+def check_monotonic(camera: Camera, *, samples: int = 48) -> Fold:
+    """Look for the fold, and for pixels that no ray reaches, on a grid that includes the border.
+
+    Parameters
+    ----------
+    camera : the camera
+    samples : pixels along each side of the grid
+    """
+    width, height = camera.size
+    across, down = np.meshgrid(
+        np.linspace(-0.5, width - 0.5, samples), np.linspace(-0.5, height - 0.5, samples)
+    )
+    rays = camera.unproject(np.stack([across.ravel(), down.ravel()], axis=-1))
+    lost = float(np.isnan(rays[:, 0]).mean())
+    limit = camera.limit
+    is_fisheye = camera.lens == "fisheye4"
+    if not np.isfinite(limit) or (is_fisheye and limit >= np.pi):
+        return Fold(np.inf, np.inf, lost > 0.0, lost)
+    focal = float(np.sqrt(camera.intrinsics[0] * camera.intrinsics[1]))
+    angle = limit if is_fisheye else float(np.arctan(limit))
+    return Fold(focal * _image_radius(camera, limit), angle, lost > 0.0, lost)
+
+
+def _image_radius(camera: Camera, t: float) -> float:
+    """Radial part of the distortion at t, in focal lengths; just inside of a pole it is huge."""
+    k = dict(zip(_names(camera.lens), camera.distortion, strict=True))
+    s = t * t
+    if camera.lens == "fisheye4":
+        return float(t * (1.0 + s * (k["k1"] + s * (k["k2"] + s * (k["k3"] + s * k["k4"])))))
+    top = 1.0 + s * (k.get("k1", 0.0) + s * (k.get("k2", 0.0) + s * k.get("k3", 0.0)))
+    under = 1.0 + s * (k.get("k4", 0.0) + s * (k.get("k5", 0.0) + s * k.get("k6", 0.0)))
+    return float(t * top / under) if under != 0.0 else float("inf")
+
+
+def _names(lens: str) -> tuple[str, ...]:
+    return LENSES[lens].distortion
+
+
+def _first_sign_change(polynomial: Polynomial) -> float:
+    """Smallest positive root at which a polynomial that is 1 at 0 turns negative; inf where none."""
+    roots = polynomial.trim().roots()
+    real = np.sort(roots.real[np.abs(roots.imag) <= IMAGINARY_MAX * np.maximum(1.0, np.abs(roots))])
+    for root in real[real > 0.0]:
+        if polynomial(root * (1.0 + 1e-6)) <= 0.0:
+            return float(root)
+    return float("inf")
