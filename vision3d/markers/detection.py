@@ -1,0 +1,180 @@
+"""Square markers in one picture: their numbers, their corners to a hundredth of a pixel, and how sure those are.
+
+OpenCV finds candidate squares and reads their cells; the corners are ours: lines fitted to the four sides,
+whose scatter says what each corner is worth (`vision3d.kernels.quad_edges`).
+
+>>> from vision3d.markers import detect_markers
+>>> detect_markers(image, "6x6_250")  # doctest: +SKIP
+(Marker(id=23, ...), Marker(id=40, ...))
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import ShapeError
+from vision3d.markers.dictionaries import (
+    DICTIONARIES,
+    FAMILIES,
+    dictionary_name,
+    opencv_dictionary,
+    smallest_of,
+    surprise,
+)
+
+__all__ = ["Marker", "detect_markers", "find_markers"]
+
+Array = NDArray[np.float64]
+
+SYSTEMATIC_PX = 0.015  # what is left of an edge's position with neither noise nor blur: 8 bits, sampling
+CORRELATION = 2.0  # neighbouring profiles share pixels: their mean is worth half as many
+UNREFINED_PX = 0.5  # corners as OpenCV's contours give them
+REACH_PX = 2.5
+SMALLEST_PX = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Marker:
+    """One marker in a picture; arrays are copied and read-only.
+
+    Parameters
+    ----------
+    id : its number in the dictionary
+    corners : (4, 2) px, clockwise from the top left of the marker as printed
+    sigma_px : (4,) standard deviation of a coordinate of each corner
+    cov_px2 : (8, 8) covariance of x0 y0 x1 y1 …; neighbours share a side, so their errors go together
+    refined : whether lines were fitted to its sides; otherwise the corners are those of a contour
+    dictionary : by the name of `vision3d.boards`
+    """
+
+    id: int
+    corners: Array
+    sigma_px: Array
+    cov_px2: Array | None = None
+    refined: bool = False
+    dictionary: str = ""
+
+    def __post_init__(self) -> None:
+        corners = np.array(self.corners, dtype=np.float64)
+        if corners.shape != (4, 2):
+            raise ShapeError(f"marker {self.id}: corners are (4, 2), got {corners.shape}")
+        sigma = np.array(np.broadcast_to(np.asarray(self.sigma_px, dtype=np.float64), (4,)))
+        cov = np.diag(np.repeat(sigma**2, 2)) if self.cov_px2 is None else np.array(self.cov_px2, dtype=float)
+        for name, array in (("corners", corners), ("sigma_px", sigma), ("cov_px2", cov)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def centre(self) -> Array:
+        """Where the diagonals cross: the image of the marker's centre, (2,) px."""
+        a, b, c, d = self.corners
+        along, across = c - a, d - b
+        det = along[0] * across[1] - along[1] * across[0]
+        share = ((b - a)[0] * across[1] - (b - a)[1] * across[0]) / det
+        centre: Array = a + share * along
+        return centre
+
+    @property
+    def side_px(self) -> float:
+        """Mean length of its sides."""
+        return float(np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=0), axis=1).mean())
+
+
+def detect_markers(image: NDArray[np.uint8], dictionary: str = "auto") -> tuple[Marker, ...]:
+    """Find the markers of a dictionary, in the order of their numbers.
+
+    Parameters
+    ----------
+    image : (height, width) or (height, width, 3), 8 bits
+    dictionary : its name, as in `vision3d.boards`; "auto" tries every family and keeps the likeliest
+
+    Raises
+    ------
+    ShapeError, ModelError
+        where the image is no image, or there is no such dictionary.
+    """
+    return find_markers(image, dictionary)[0]
+
+
+def find_markers(image: NDArray[np.uint8], dictionary: str = "auto") -> tuple[tuple[Marker, ...], str | None]:
+    """Find markers and say of which dictionary; None where "auto" found nothing."""
+    grey = _grey(image)
+    if dictionary != "auto":
+        name = dictionary_name(dictionary)
+        return _refined(grey, *_squares(grey, name), name), name
+    best: tuple[float, str | None] = (0.0, None)
+    for family, longest in FAMILIES.items():
+        quads, ids = _squares(grey, longest)
+        score = len(ids) * surprise(longest)
+        if score > best[0]:
+            best = (score, smallest_of(family, int(ids.max())))
+    if best[1] is None:
+        return (), None
+    return _refined(grey, *_squares(grey, best[1]), best[1]), best[1]
+
+
+def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """One channel, contiguous."""
+    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.ndim not in {2, 3}:
+        told = (
+            f"{image.dtype} of shape {image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
+        )
+        raise ShapeError(f"an image is uint8 of shape (height, width) or (height, width, 3), got {told}")
+    if image.ndim == 2:
+        return np.ascontiguousarray(image)
+    import cv2
+
+    if image.shape[2] not in {1, 3, 4}:
+        raise ShapeError(f"an image has 1, 3 or 4 channels, got {image.shape[2]}")
+    if image.shape[2] == 1:
+        return np.ascontiguousarray(image[..., 0])
+    code = cv2.COLOR_BGR2GRAY if image.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
+    grey: NDArray[np.uint8] = cv2.cvtColor(image, code)
+    return grey
+
+
+@cache
+def _detector(name: str) -> Any:
+    """OpenCV's detector, its corners left as the contours give them."""
+    import cv2
+
+    settings = cv2.aruco.DetectorParameters()
+    settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+    return cv2.aruco.ArucoDetector(opencv_dictionary(name), settings)
+
+
+def _squares(grey: NDArray[np.uint8], name: str) -> tuple[Array, NDArray[np.int64]]:
+    """What OpenCV reads: corners (M, 4, 2) and numbers (M,), each number once (its largest square)."""
+    found, numbers, _ = _detector(name).detectMarkers(grey)
+    ids = np.zeros(0, dtype=np.int64) if numbers is None else np.asarray(numbers, dtype=np.int64).reshape(-1)
+    quads = np.array([np.asarray(one, dtype=np.float64).reshape(4, 2) for one in found]).reshape(-1, 4, 2)
+    order = np.lexsort((-_sides(quads), ids))
+    return np.ascontiguousarray(quads[order]), ids[order]
+
+
+def _sides(quads: Array) -> Array:
+    """Mean length of the sides, (M,)."""
+    sides: Array = np.linalg.norm(quads - np.roll(quads, 1, axis=1), axis=2).mean(axis=1)
+    return sides
+
+
+def _refined(grey: NDArray[np.uint8], quads: Array, ids: NDArray[np.int64], name: str) -> tuple[Marker, ...]:
+    """Markers with our corners."""
+    if not len(ids):
+        return ()
+    from vision3d.kernels.quad_edges import refine_quads
+
+    corners, covs = np.empty_like(quads), np.zeros((len(ids), 8, 8))
+    done = np.zeros(len(ids), dtype=np.bool_)
+    cells = DICTIONARIES[name].bits + 2
+    refine_quads(grey, quads, cells, SYSTEMATIC_PX, CORRELATION, REACH_PX, corners, covs, done)
+    covs[~done] = np.eye(8) * UNREFINED_PX**2
+    sigmas = np.sqrt(np.diagonal(covs, axis1=1, axis2=2).reshape(-1, 4, 2).mean(axis=2))
+    return tuple(
+        Marker(int(ids[m]), corners[m], sigmas[m], covs[m], bool(done[m]), name) for m in range(len(ids))
+    )
