@@ -1,0 +1,87 @@
+"""The corners of all views in the flat arrays that the adjustment's kernel reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision3d.views import View
+
+__all__ = ["Problem"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Corners of all views one after the other: M in all.
+
+    Attributes
+    ----------
+    points, pixels : Array
+        (M, 3) on the board, m; (M, 2) in the image, px.
+    sigma_px : Array
+        (M,), what the detection says of every corner, per axis.
+    bend : Array
+        (M, 2): how far along z the two numbers of a bent board push each point: 1 in the middle of the
+        board and 0 at its ends, along x and along y.
+    starts : NDArray[np.int64]
+        (V + 1,): view v has the corners starts[v] to starts[v + 1].
+    size : tuple[int, int]
+        Width and height of the images.
+    """
+
+    points: Array
+    pixels: Array
+    sigma_px: Array
+    bend: Array
+    starts: NDArray[np.int64]
+    size: tuple[int, int]
+
+    @classmethod
+    def of(cls, views: Sequence[View]) -> Problem:
+        """Lay out the corners of the views."""
+        points = np.concatenate([np.asarray(view.points, np.float64) for view in views])
+        counts = [len(view.points) for view in views]
+        return cls(
+            points,
+            np.concatenate([np.asarray(view.pixels, np.float64) for view in views]),
+            np.concatenate([np.asarray(view.sigma_px, np.float64) for view in views]),
+            _bend(points),
+            np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+            views[0].size,
+        )
+
+    @property
+    def count(self) -> int:
+        """How many views there are."""
+        return len(self.starts) - 1
+
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        """Number of the view of every corner, (M,)."""
+        return np.repeat(np.arange(self.count), np.diff(self.starts))
+
+    def only(self, chosen: Sequence[int] | NDArray[np.int64]) -> Problem:
+        """The same with the chosen views alone."""
+        rows = np.concatenate([np.arange(self.starts[v], self.starts[v + 1]) for v in chosen])
+        counts = np.diff(self.starts)[np.asarray(chosen, np.int64)]
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        return Problem(
+            self.points[rows], self.pixels[rows], self.sigma_px[rows], self.bend[rows], starts, self.size
+        )
+
+    def split(self, values: Array) -> tuple[Array, ...]:
+        """Cut an array (M, ...) into one array a view."""
+        return tuple(np.split(values, self.starts[1:-1]))
+
+
+def _bend(points: Array) -> Array:
+    """A parabola along each axis of the board, 1 in its middle and 0 at its ends."""
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    reach = np.where(high > low, 0.5 * (high - low), 1.0)
+    at = (points[:, :2] - 0.5 * (low + high)) / reach
+    return np.ascontiguousarray(1.0 - at**2)

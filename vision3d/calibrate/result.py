@@ -1,0 +1,162 @@
+"""From a solved adjustment to a `Calibration`: scales, covariances, names of what did not fit, findings."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import UnderConstrainedError
+from sequential.manifold.quaternion import rotation_matrix
+from vision3d.calibrate.adjustment import schur
+from vision3d.calibrate.calibration import Calibration, SolveReport
+from vision3d.calibrate.problem import Problem
+from vision3d.calibrate.robust import Trusted
+from vision3d.camera import LENSES, Camera
+from vision3d.views import View
+
+__all__ = ["result_of"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FREE_FOCAL = 0.25
+"""Relative standard deviation of a focal length from which the views are said to leave it free."""
+WEAK_FOCAL = 0.01
+ILL = 1e8
+
+
+def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free: Mask) -> Calibration:
+    """Judge the solution and put everything together.
+
+    Raises
+    ------
+    UnderConstrainedError
+        The views leave a parameter free.
+    """
+    solution, unknowns = trusted.solution, trusted.solution.unknowns
+    residuals, relative = solution.blocks.residuals, trusted.weights
+    used = relative > 0.0
+    freedom = max(2 * int(used.sum()) - int(free.sum()) - 6 * problem.count, 1)
+    scale = float(np.sqrt(2.0 * solution.cost / freedom))
+    joint, alone, follows, condition, weakest = _covariances(trusted, free, problem, scale)
+    p = len(unknowns.parameters)
+    camera = Camera(unknowns.lens, unknowns.parameters[:4], unknowns.parameters[4:], problem.size)
+    pose_covs = alone + np.einsum("vip,pq,vjq->vij", follows, joint, follows)
+    squares = np.sum(residuals**2, axis=1)
+    view_rms = np.sqrt([np.mean(one) for one in problem.split(squares)])
+    owner = problem.owner
+    numbers = np.concatenate([view.ids for view in views])
+    left_out = tuple((int(owner[i]), int(numbers[i])) for i in np.flatnonzero(~used))
+    rms = float(np.sqrt(np.mean(squares[used])))
+    findings = _findings(views, camera, trusted, left_out, view_rms, np.sqrt(np.diag(joint)), condition)
+    message = (
+        f"{camera.lens}: {len(views)} views, {int(used.sum())} of {len(used)} corners, RMS {rms:.3f} px, "
+        f"{'settled' if solution.converged else 'not settled'} after {trusted.iterations} steps"
+    )
+    report = SolveReport(message, solution.converged, trusted.iterations, condition, weakest, findings)
+    return Calibration(
+        camera=camera,
+        cov=joint[:p, :p].copy(),
+        poses=unknowns.poses,
+        pose_covs=pose_covs,
+        pose_follows=follows,
+        pose_alone=alone,
+        joint_cov=joint,
+        warp=unknowns.warp,
+        views=views,
+        residuals=problem.split(residuals),
+        weights=problem.split(relative),
+        sigma_scale=scale,
+        sigma_px=scale * float(np.sqrt(np.mean(problem.sigma_px[used] ** 2))),
+        rms_px=rms,
+        rms_all_px=float(np.sqrt(np.mean(squares))),
+        view_rms=view_rms,
+        outliers=left_out,
+        outlier_views=trusted.outlier_views,
+        report=report,
+    )
+
+
+def _covariances(
+    trusted: Trusted, free: Mask, problem: Problem, scale: float
+) -> tuple[Array, Array, Array, float, str]:
+    """Joint covariance (q, q), poses' own (V, 6, 6), how they follow (V, 6, q), condition, weakest."""
+    blocks, unknowns = trusted.solution.blocks, trusted.solution.unknowns
+    S, _, T_inverse, Y = schur(blocks, free)
+    sizes = np.sqrt(np.maximum(np.diag(S), 1e-300))
+    values, vectors = np.linalg.eigh(S / sizes[:, None] / sizes[None, :])
+    names = np.array([*LENSES[unknowns.lens].parameters, "wx", "wy"])
+    share = np.abs(vectors[:, 0])
+    weakest = ", ".join(names[free][share > 0.5 * share.max()])
+    condition = float(values[-1] / values[0]) if values[0] > 0.0 else np.inf
+    cov = (vectors / np.maximum(values, 1e-300)) @ vectors.T / sizes[:, None] / sizes[None, :] * scale**2
+    focal = float(np.sqrt(np.abs(np.diag(cov)[:2])).max() / unknowns.parameters[:2].min())
+    if not focal < FREE_FOCAL:
+        raise UnderConstrainedError(_missing(problem, unknowns.poses, focal))
+    joint = np.zeros((len(free), len(free)))
+    joint[np.ix_(free, free)] = 0.5 * (cov + cov.T)
+    follows = np.zeros((problem.count, 6, len(free)))
+    follows[:, :, free] = Y
+    return joint, scale**2 * T_inverse, follows, condition, weakest
+
+
+def _missing(problem: Problem, poses: Array, focal: float) -> str:
+    """Say which pose is missing when the focal length is free."""
+    tilt = np.degrees(np.arccos(np.clip(np.abs(rotation_matrix(poses[:, :4])[:, 2, 2]), 0.0, 1.0)))
+    told = f"its standard deviation would be {100 * focal:.0f} %" if np.isfinite(focal) else "it is free"
+    advice = "to other sides, near enough to fill the image"
+    if tilt.max() < 15.0:
+        told += f"; the board is never tilted by more than {tilt.max():.0f}° against the image"
+        advice = "about its vertical axis and about its horizontal axis"
+    return (
+        f"{problem.count} views do not determine the focal length ({told}): add views with the board "
+        f"tilted by 30-45° {advice}"
+    )
+
+
+def _findings(
+    views: tuple[View, ...],
+    camera: Camera,
+    trusted: Trusted,
+    left_out: tuple[tuple[int, int], ...],
+    view_rms: Array,
+    std: Array,
+    condition: float,
+) -> tuple[str, ...]:
+    """Sentences about what a user should know."""
+    found: list[str] = []
+    if not trusted.solution.converged:
+        found.append("the solve had not settled when it ended: the result may be away from the best fit")
+    for v in trusted.outlier_views:
+        ratio = view_rms[v] / float(np.median(view_rms))
+        found.append(
+            f"{views[v].name} fits {ratio:.1f}x worse than the others (RMS {view_rms[v]:.2f} px) and counts "
+            "accordingly less; look at its corners, or leave it out"
+        )
+    for v in sorted({one for one, _ in left_out}):
+        corners = ", ".join(str(corner) for one, corner in left_out if one == v)
+        found.append(f"{views[v].name}: left out corner {corners}, further off than noise explains")
+    found.extend(
+        f"{views[v].name} shows the board from behind: its corners are numbered in mirror image, as when "
+        "the picture was flipped"
+        for v in _from_behind(trusted.solution.unknowns.poses, views)
+    )
+    if (std[:2] > WEAK_FOCAL * camera.parameters[:2]).any():
+        share = 100.0 * float((std[:2] / camera.parameters[:2]).max())
+        found.append(
+            f"the views hardly determine the focal length (standard deviation {share:.1f} %); add tilted views"
+        )
+    if condition > ILL:
+        found.append(
+            f"some parameters can trade places with each other (condition {condition:.0e}): read the "
+            "uncertainty of projections, not of single coefficients, or take a lens with fewer coefficients"
+        )
+    if (fold := camera.check_monotonic()).inside:
+        found.append(str(fold))
+    return tuple(found)
+
+
+def _from_behind(poses: Array, views: tuple[View, ...]) -> list[int]:
+    """Views of a flat board whose z axis points towards the camera."""
+    away = np.einsum("vi,vi->v", rotation_matrix(poses[:, :4])[:, :, 2], poses[:, 4:]) > 0.0
+    return [v for v, view in enumerate(views) if not away[v] and not np.ptp(view.points[:, 2]) > 0.0]
