@@ -71,4 +71,5 @@ def stereo_rectify(
     shift = np.asarray(T, dtype=np.float64).reshape(3, 1)
     found: Any = cv2.stereoRectify(K1, d1, K2, d2, tuple(size), np.asarray(R, float), shift, **options)
     valid: list[Any] = [tuple(int(side) for side in rectangle) for rectangle in found[5:7]]
-    return Rectification(*found[:5], valid[0], valid[1])
+    R1, R2, P1, P2, Q = found[:5]
+    return Rectification(R1, R2, P1, P2, Q, valid[0], valid[1])
