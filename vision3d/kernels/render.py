@@ -1,8 +1,8 @@
 """Paint a textured plane into an image, and turn radiance into grey levels.
 
 `paint` maps the corners of every pixel onto the plane.  A pixel whose corners fall into one cell of the
-texture is of one value; only the pixels that an edge crosses are sampled, in perspective, at the points of a
-lattice.  That makes the sampling of edges fine and the whole quick.
+texture has one value.  One that straight edges cross is cut along them: its value is exact.  Only where
+an edge is curved, or a picture is shown, are pixels sampled, in perspective, at points of a lattice.
 
 A texture is cells between sorted edges (`x_edges`, `y_edges`, m) with a value each, 0-1, or less than 0 where
 one sees through.  What `kind` adds:
@@ -11,9 +11,6 @@ one sees through.  What `kind` adds:
 - DISTANCE: `values` are signed distances (m) at the crossings of a regular grid; `inner[0, 0]` is the value
   where they are below 0, `inner[0, 1]` elsewhere;
 - PICTURE: `values` are reflectances at the crossings of a regular grid, interpolated.
-
-`x_bins` and `y_bins` give for each of many equal steps the first cell that it touches, so that a cell is
-found without a search.
 """
 
 from __future__ import annotations
@@ -24,27 +21,23 @@ import numpy as np
 from numba import types
 
 from vision3d.kernels import inlined, kernel
-from vision3d.kernels.arrays import f0, f1, f2, f3, i0, i1, wu2
+from vision3d.kernels.arrays import f0, f1, f2, f3, i0, w1, w2, wu2
 
 __all__ = ["CELLS", "DISTANCE", "PICTURE", "develop", "paint"]
 
 CELLS, DISTANCE, PICTURE = 0, 1, 2
 f_image, w_image = types.Array(types.float32, 2, "C", readonly=True), types.float32[:, ::1]
+VERTICES = 24  # a quadrilateral gains one where it is cut; two cuts each way are all that a cell makes
 
 
 @inlined
-def find_cell(v, edges, bins):
-    """The cell of a coordinate, -1 outside."""
-    first, last = edges[0], edges[edges.shape[0] - 1]
-    if not (v >= first and v < last):
-        return -1
-    k = int((v - first) / (last - first) * bins.shape[0])
-    cell = bins[min(k, bins.shape[0] - 1)]
-    while cell > 0 and v < edges[cell]:
-        cell -= 1
-    while v >= edges[cell + 1]:
-        cell += 1
-    return cell
+def walk(v, edges, k):
+    """The cell of a coordinate between the outermost edges, looked for from cell `k` on."""
+    while v < edges[k]:
+        k -= 1
+    while v >= edges[k + 1]:
+        k += 1
+    return k
 
 
 @inlined
@@ -61,51 +54,121 @@ def interpolated(x, y, x_edges, y_edges, values):
     return upper + v * (lower - upper)
 
 
-@inlined
-def shade(kind, x, y, x_edges, y_edges, x_bins, y_bins, values, radii, inner):
+@kernel(f0(i0, f0, f0, f1, f1, f_image, f_image, f_image))
+def shade(kind, x, y, x_edges, y_edges, values, radii, inner):
     """The value at a point of the plane, negative where one sees through."""
-    if kind == CELLS:
-        j = find_cell(x, x_edges, x_bins)
-        i = find_cell(y, y_edges, y_bins)
-        if i < 0 or j < 0:
-            return -1.0
-        r = float(radii[i, j])
-        if r > 0.0:
-            dx = x - 0.5 * (x_edges[j] + x_edges[j + 1])
-            dy = y - 0.5 * (y_edges[i] + y_edges[i + 1])
-            if dx * dx + dy * dy < r * r:
-                return float(inner[i, j])
-        return float(values[i, j])
-    if not (
-        x >= x_edges[0]
-        and x < x_edges[x_edges.shape[0] - 1]
-        and y >= y_edges[0]
-        and y < y_edges[y_edges.shape[0] - 1]
-    ):
+    last_x, last_y = x_edges[x_edges.shape[0] - 1], y_edges[y_edges.shape[0] - 1]
+    if not (x >= x_edges[0] and x < last_x and y >= y_edges[0] and y < last_y):
         return -1.0
+    if kind == CELLS:
+        columns, rows = x_edges.shape[0] - 1, y_edges.shape[0] - 1
+        j = walk(x, x_edges, int(columns * (x - x_edges[0]) / (last_x - x_edges[0])))
+        i = walk(y, y_edges, int(rows * (y - y_edges[0]) / (last_y - y_edges[0])))
+        r = float(radii[i, j])
+        dx = x - 0.5 * (x_edges[j] + x_edges[j + 1])
+        dy = y - 0.5 * (y_edges[i] + y_edges[i + 1])
+        return float(inner[i, j]) if dx * dx + dy * dy < r * r else float(values[i, j])
     value = float(interpolated(x, y, x_edges, y_edges, values))
     if kind == PICTURE:
         return value
     return float(inner[0, 0]) if value < 0.0 else float(inner[0, 1])
 
 
-@kernel(types.void(w_image, f3, f2, i0, f1, f1, i1, i1, f_image, f_image, f_image, f2))
-def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, x_bins, y_bins, values, radii, inner, samples):
+@kernel(i0(f2, i0, i0, f0, w2, w2))
+def cut(polygon, count, axis, at, low, high):
+    """Cut a convex polygon along a coordinate; how many vertices each side has: low + VERTICES * high."""
+    n_low, n_high = 0, 0
+    for k in range(count):
+        following = k + 1 if k + 1 < count else 0
+        a, b = polygon[k, axis] - at, polygon[following, axis] - at
+        if a <= 0.0:
+            low[n_low, 0], low[n_low, 1] = polygon[k, 0], polygon[k, 1]
+            n_low += 1
+        if a >= 0.0:
+            high[n_high, 0], high[n_high, 1] = polygon[k, 0], polygon[k, 1]
+            n_high += 1
+        if (a < 0.0 and b > 0.0) or (a > 0.0 and b < 0.0):
+            share = a / (a - b)
+            x = polygon[k, 0] + share * (polygon[following, 0] - polygon[k, 0])
+            y = polygon[k, 1] + share * (polygon[following, 1] - polygon[k, 1])
+            low[n_low, 0], low[n_low, 1] = x, y
+            high[n_high, 0], high[n_high, 1] = x, y
+            n_low += 1
+            n_high += 1
+    return n_low + VERTICES * n_high
+
+
+@kernel(f0(f2, i0))
+def area(polygon, count):
+    """The area of a polygon."""
+    total = 0.0
+    for k in range(1, count - 1):
+        ax, ay = polygon[k, 0] - polygon[0, 0], polygon[k, 1] - polygon[0, 1]
+        bx, by = polygon[k + 1, 0] - polygon[0, 0], polygon[k + 1, 1] - polygon[0, 1]
+        total += ax * by - ay * bx
+    return 0.5 * abs(total)
+
+
+@inlined
+def first_cell(lowest, edges):
+    """The cell in which a polygon begins, -1 before the first edge."""
+    if lowest < edges[0]:
+        return -1
+    k = 0
+    while k + 1 < edges.shape[0] and lowest >= edges[k + 1]:
+        k += 1
+    return k
+
+
+@kernel(types.void(w2, f1, f1, f_image, w2, w2, w2, w2, w1))
+def cover(rest, x_edges, y_edges, values, column, piece, high, spare, found):
+    """Integrate cells over the quadrilateral `rest` (VERTICES, 2): found = value * share, share."""
+    whole = area(rest, 4)
+    found[0], found[1] = 0.0, 0.0
+    kx = first_cell(min(rest[0, 0], rest[1, 0], rest[2, 0], rest[3, 0]), x_edges)
+    n_rest = 4
+    while n_rest > 2 and kx < x_edges.shape[0] - 1:
+        counts = cut(rest, n_rest, 0, x_edges[kx + 1], column, high)
+        n_column, n_rest = counts % VERTICES, counts // VERTICES
+        rest[:n_rest] = high[:n_rest]
+        if kx >= 0 and n_column > 2:
+            lowest = column[0, 1]
+            for k in range(1, n_column):
+                lowest = min(lowest, column[k, 1])
+            ky = first_cell(lowest, y_edges)
+            while n_column > 2 and ky < y_edges.shape[0] - 1:
+                counts = cut(column, n_column, 1, y_edges[ky + 1], piece, spare)
+                n_piece, n_column = counts % VERTICES, counts // VERTICES
+                column[:n_column] = spare[:n_column]
+                if ky >= 0 and values[ky, kx] >= 0.0:
+                    share = area(piece, n_piece) / whole
+                    found[0] += share * values[ky, kx]
+                    found[1] += share
+                ky += 1
+        kx += 1
+
+
+@kernel(types.void(w_image, f3, f2, i0, f1, f1, f_image, f_image, f_image, f2))
+def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, values, radii, inner, samples):
     """Paint the plane over an image of radiance (h, w), in place.
 
     `rays` (h + 1, w + 1, 3) go through the corners of the pixels, NaN where there is none; `plane_from_ray`
     (3, 3) takes a ray to homogeneous coordinates of the plane; `samples` (n, 2) lie in the unit square.
     """
     height, width = image.shape
-    count = samples.shape[0]
     h00, h01, h02 = plane_from_ray[0, 0], plane_from_ray[0, 1], plane_from_ray[0, 2]
     h10, h11, h12 = plane_from_ray[1, 0], plane_from_ray[1, 1], plane_from_ray[1, 2]
     h20, h21, h22 = plane_from_ray[2, 0], plane_from_ray[2, 1], plane_from_ray[2, 2]
-    # two rows of corners: homogeneous coordinates, coordinates, and the code of what lies there
+    left, right = x_edges[0], x_edges[x_edges.shape[0] - 1]
+    top, bottom = y_edges[0], y_edges[y_edges.shape[0] - 1]
+    # two rows of corners: homogeneous coordinates, coordinates, and the code of the cell that lies there
     a, b, c = np.empty((2, width + 1)), np.empty((2, width + 1)), np.empty((2, width + 1))
-    xs, ys = np.empty((2, width + 1)), np.empty((2, width + 1))
+    xs, ys = np.zeros((2, width + 1)), np.zeros((2, width + 1))
     codes = np.empty((2, width + 1), np.int64)
+    polygons = np.empty((5, VERTICES, 2))
+    found = np.empty(2)
     columns = np.int64(x_edges.shape[0])
+    kx, ky = 0, 0
     for row in range(height + 1):
         now, past = row & 1, (row + 1) & 1
         for j in range(width + 1):
@@ -115,22 +178,25 @@ def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, x_bins, y_bins, v
             qc = h20 * dx + h21 * dy + h22 * dz
             a[now, j], b[now, j], c[now, j] = qa, qb, qc
             if not (qc > 0.0):
-                codes[now, j] = -2  # behind the camera, or no ray
+                codes[now, j] = -9  # behind the camera, or no ray
                 continue
-            x, y = qa / qc, qb / qc
+            inverse = 1.0 / qc
+            x, y = qa * inverse, qb * inverse
             xs[now, j], ys[now, j] = x, y
-            if kind == CELLS:
-                cell_x = find_cell(x, x_edges, x_bins)
-                cell_y = find_cell(y, y_edges, y_bins)
-                codes[now, j] = -1 if cell_x < 0 or cell_y < 0 else cell_y * columns + cell_x
+            # outside: one code a side, so that a texture narrower than a pixel is not missed
+            if x < left:
+                codes[now, j] = -1
+            elif x >= right:
+                codes[now, j] = -2
+            elif y < top:
+                codes[now, j] = -3
+            elif y >= bottom:
+                codes[now, j] = -4
+            elif kind == CELLS:
+                kx, ky = walk(x, x_edges, kx), walk(y, y_edges, ky)
+                codes[now, j] = ky * columns + kx
             else:
-                inside = (
-                    x >= x_edges[0]
-                    and x < x_edges[columns - 1]
-                    and y >= y_edges[0]
-                    and y < y_edges[y_edges.shape[0] - 1]
-                )
-                codes[now, j] = 0 if inside else -1
+                codes[now, j] = 0
         if row == 0:
             continue
         i = row - 1
@@ -139,49 +205,63 @@ def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, x_bins, y_bins, v
             same = code == codes[past, j + 1] and code == codes[now, j] and code == codes[now, j + 1]
             if same and code < 0:
                 continue
-            if same:
+            x0, x1, x2, x3 = xs[past, j], xs[past, j + 1], xs[now, j + 1], xs[now, j]
+            y0, y1, y2, y3 = ys[past, j], ys[past, j + 1], ys[now, j + 1], ys[now, j]
+            c0, c1, c2, c3 = c[past, j], c[past, j + 1], c[now, j + 1], c[now, j]
+            nearest, farthest = min(c0, c1, c2, c3), max(c0, c1, c2, c3)
+            flat = nearest > 0.98 * farthest  # and so no corner is behind the camera
+            straight = kind == CELLS
+            if same and kind != PICTURE:
+                # how far a curved edge is from the pixel, against the pixel's own extent
                 if kind == CELLS:
                     n = code // columns
                     m = code - n * columns
-                    r = float(radii[n, m])
-                    if r == 0.0:
-                        value = float(values[n, m])
-                        if value >= 0.0:
-                            image[i, j] = value
-                        continue
-                    # how far the disc's rim is from the pixel, against the pixel's own extent
-                    ex = 0.5 * (x_edges[m] + x_edges[m + 1])
-                    ey = 0.5 * (y_edges[n] + y_edges[n + 1])
-                    near = abs(math.hypot(xs[past, j] - ex, ys[past, j] - ey) - r)
-                elif kind == DISTANCE:
-                    near = abs(interpolated(xs[past, j], ys[past, j], x_edges, y_edges, values))
+                    value = float(values[n, m])
+                    radius = float(radii[n, m])
+                    away = math.inf
+                    if radius > 0.0:
+                        ex, ey = 0.5 * (x_edges[m] + x_edges[m + 1]), 0.5 * (y_edges[n] + y_edges[n + 1])
+                        away = math.hypot(x0 - ex, y0 - ey) - radius
+                        if away < 0.0:
+                            value = float(inner[n, m])
                 else:
-                    near = 0.0
-                wide = max(
-                    math.hypot(xs[now, j + 1] - xs[past, j], ys[now, j + 1] - ys[past, j]),
-                    math.hypot(xs[now, j] - xs[past, j + 1], ys[now, j] - ys[past, j + 1]),
-                )
-                if near > 1.5 * wide:
-                    value = shade(
-                        kind, xs[past, j], ys[past, j], x_edges, y_edges, x_bins, y_bins, values, radii, inner
-                    )
+                    away = float(interpolated(x0, y0, x_edges, y_edges, values))
+                    value = float(inner[0, 0]) if away < 0.0 else float(inner[0, 1])
+                if away == math.inf or abs(away) > 1.5 * max(
+                    math.hypot(x2 - x0, y2 - y0), math.hypot(x3 - x1, y3 - y1)
+                ):
                     if value >= 0.0:
                         image[i, j] = value
                     continue
+                straight = False
+            if straight and flat:
+                # a disc in one of the cells may be near, too
+                for corner in (code, codes[past, j + 1], codes[now, j], codes[now, j + 1]):
+                    if corner >= 0 and radii[corner // columns, corner % columns] > 0.0:
+                        straight = False
+            if straight and flat:
+                rest = polygons[0]
+                rest[0, 0], rest[1, 0], rest[2, 0], rest[3, 0] = x0, x1, x2, x3
+                rest[0, 1], rest[1, 1], rest[2, 1], rest[3, 1] = y0, y1, y2, y3
+                cover(
+                    rest, x_edges, y_edges, values, polygons[1], polygons[2], polygons[3], polygons[4], found
+                )
+                image[i, j] += np.float32(found[0] - found[1] * image[i, j])
+                continue
             total, covered = 0.0, 0
-            for k in range(count):
+            for k in range(samples.shape[0]):
                 u, v = samples[k, 0], samples[k, 1]
-                w00, w01, w10, w11 = (1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v
-                qc = w00 * c[past, j] + w01 * c[past, j + 1] + w10 * c[now, j] + w11 * c[now, j + 1]
+                p0, p1, p2, p3 = (1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v
+                qc = p0 * c0 + p1 * c1 + p2 * c2 + p3 * c3
                 if not (qc > 0.0):
                     continue
-                qa = w00 * a[past, j] + w01 * a[past, j + 1] + w10 * a[now, j] + w11 * a[now, j + 1]
-                qb = w00 * b[past, j] + w01 * b[past, j + 1] + w10 * b[now, j] + w11 * b[now, j + 1]
-                value = shade(kind, qa / qc, qb / qc, x_edges, y_edges, x_bins, y_bins, values, radii, inner)
+                qa = p0 * a[past, j] + p1 * a[past, j + 1] + p2 * a[now, j + 1] + p3 * a[now, j]
+                qb = p0 * b[past, j] + p1 * b[past, j + 1] + p2 * b[now, j + 1] + p3 * b[now, j]
+                value = shade(kind, qa / qc, qb / qc, x_edges, y_edges, values, radii, inner)
                 if value >= 0.0:
                     total += value
                     covered += 1
-            image[i, j] += np.float32((total - covered * image[i, j]) / count)
+            image[i, j] += np.float32((total - covered * image[i, j]) / samples.shape[0])
 
 
 @kernel(types.void(f_image, f_image, f0, f0, f0, wu2))

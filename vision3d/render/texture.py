@@ -6,7 +6,7 @@ Reflectance is 0 (black) to 1 (white); nothing is painted outside the texture or
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ __all__ = ["DARK", "LIGHT", "PAPER", "Texture", "cells", "distance_field", "pict
 
 DARK, LIGHT, PAPER = 0.12, 0.85, 0.9  # ink and paper, as a camera sees them
 _CELLS, _DISTANCE, _PICTURE = 0, 1, 2  # as in vision3d.kernels.render
-BINS_A_CELL = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +38,6 @@ class Texture:
     values: NDArray[np.float32]
     radii: NDArray[np.float32]
     inner: NDArray[np.float32]
-    x_bins: NDArray[np.int64] = field(init=False)
-    y_bins: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         for name in ("x_edges", "y_edges"):
@@ -48,7 +45,6 @@ class Texture:
             if edges.ndim != 1 or len(edges) < 2 or not (np.diff(edges) > 0).all():
                 raise ModelError(f"{name} of a texture must increase, and be two or more; got {edges}")
             _frozen(self, name, edges)
-            _frozen(self, name.replace("edges", "bins"), _bins(edges))
         for name in ("values", "radii", "inner"):
             _frozen(self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float32))
         step = 1 if self.kind == _CELLS else 0
@@ -57,6 +53,11 @@ class Texture:
             raise ShapeError(
                 f"values of a texture must be {expected}, rows by columns; got {self.values.shape}"
             )
+
+    @property
+    def is_picture(self) -> bool:
+        """Whether it is smooth, without edges of its own."""
+        return self.kind == _PICTURE
 
     @property
     def size_m(self) -> tuple[float, float]:
@@ -147,13 +148,6 @@ def _even(values: ArrayLike) -> NDArray[np.float64]:
     if len(grid) < 2 or not np.allclose(steps, steps[0], rtol=1e-6, atol=0.0):
         raise ModelError("the grid of a distance field must have equal steps; take np.linspace")
     return grid
-
-
-def _bins(edges: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The cell in which each of many equal steps begins."""
-    count = BINS_A_CELL * (len(edges) - 1)
-    starts = edges[0] + (edges[-1] - edges[0]) * np.arange(count) / count
-    return np.clip(np.searchsorted(edges, starts, side="right") - 1, 0, len(edges) - 2).astype(np.int64)
 
 
 def _frozen(texture: Any, name: str, array: NDArray[Any]) -> None:
