@@ -1,0 +1,34 @@
+"""Smallest and largest pixel under a structuring element, on an image that has been padded."""
+
+import numba as nb
+import numpy as np
+
+from vision3d.kernels import kernel
+
+__all__ = ["extreme"]
+
+u8, f32, f64 = nb.uint8[:, ::1], nb.float32[:, ::1], nb.float64[:, ::1]
+i64 = nb.int64[:, ::1]
+
+
+@kernel(
+    [nb.void(u8, i64, nb.boolean, u8), nb.void(f32, i64, nb.boolean, f32), nb.void(f64, i64, nb.boolean, f64)]
+)
+def extreme(padded, offsets, largest, out):
+    """out[y, x] = max or min over k of padded[y + offsets[k, 0], x + offsets[k, 1]]."""
+    height, width = out.shape
+    for y in range(height):
+        line = out[y]
+        source = padded[y + offsets[0, 0]]
+        shift = offsets[0, 1]
+        for x in range(width):
+            line[x] = source[x + shift]
+        for k in range(1, len(offsets)):
+            source = padded[y + offsets[k, 0]]
+            shift = offsets[k, 1]
+            if largest:
+                for x in range(width):
+                    line[x] = np.maximum(line[x], source[x + shift])
+            else:
+                for x in range(width):
+                    line[x] = np.minimum(line[x], source[x + shift])
