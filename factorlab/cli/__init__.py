@@ -13,6 +13,7 @@ from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
 from factorlab.cli.firmware import firmware
 from factorlab.cli.info import info
+from factorlab.cli.live import live
 from factorlab.cli.record import record
 from factorlab.cli.tune import tune
 
@@ -44,5 +45,5 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, characterize, calibrate, attitude, firmware, record, info, doctor):
+for command in (demo, compare, tune, characterize, calibrate, attitude, firmware, record, live, info, doctor):
     main.add_command(command)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +12,7 @@ import click
 
 from factorlab.cli.faults import DATA_ERROR, in_one_sentence
 from factorlab.cli.settings import as_json, config_option, print_json
+from factorlab.cli.stopping import stopping
 
 if TYPE_CHECKING:
     from factorlab.live import Recorded
@@ -82,8 +81,8 @@ def serial(port: str, out: Path, as_json: bool, **options: Any) -> int:
     if out.suffix == ".tum" and options["mode"] == "raw":
         raise click.UsageError(f"{out} would hold attitudes; add --mode quaternion, or name a .csv")
     settings = RecordSettings(options["mode"], options["seconds"], options["wait"])
-    with _stopping() as stopped, SerialPort(port, options["baud"]) as line, _counter() as tell:
-        recorded = record_serial(line, out, settings, force=options["force"], stopped=stopped, tell=tell)
+    with stopping() as stop, SerialPort(port, options["baud"]) as line, _counter() as tell:
+        recorded = record_serial(line, out, settings, force=options["force"], stopped=stop.is_set, tell=tell)
     if as_json:
         print_json(recorded.to_json())
     else:
@@ -113,26 +112,6 @@ def _warnings(recorded: Recorded, calibration: Path | None) -> Iterator[str]:
         if built != wanted:
             has = f"calibration {built:08x}" if built else "no calibration"
             yield f"the board was built with {has}, {calibration} is {wanted:08x}; build and flash it anew"
-
-
-@contextmanager
-def _stopping() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C and a termination end the recording between two lines; a second one breaks it off."""
-    stop = threading.Event()
-    before: dict[int, Any] = {}
-
-    def handle(number: int, frame: Any) -> None:
-        stop.set()
-        signal.signal(number, before[number])
-
-    for number in (int(signal.SIGINT), int(signal.SIGTERM)):
-        before[number] = signal.getsignal(number)
-        signal.signal(number, handle)
-    try:
-        yield stop.is_set
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

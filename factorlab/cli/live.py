@@ -1,0 +1,95 @@
+"""`factorlab live`: what a sensor sees, while it sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from factorlab.cli.faults import DATA_ERROR, in_one_sentence
+from factorlab.cli.settings import as_json, config_option, print_json
+
+__all__ = ["live"]
+
+TASKS = ("markers", "features")
+PORT = 8090
+
+
+@click.group(short_help="A camera, live on a page.")
+def live() -> None:
+    """Look at a sensor while it runs."""
+
+
+@live.command(name="camera", short_help="Markers, calibration, a line or features.")
+@click.argument("source", metavar="[SOURCE]", default="0")
+@click.option("--task", type=click.Choice(TASKS), default="markers", show_default=True, help="To begin with.")
+@click.option("--dictionary", default="auto", show_default=True, help="Of the markers.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Of the page; 0: any free."
+)
+@click.option(
+    "--record",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Record from the start, in a folder of DIR.  [default: when asked, in ./recordings]",
+)
+@click.option("--loop", is_flag=True, help="Play a file again and again.")
+@click.option("--fast", is_flag=True, help="A file as quickly as possible, without passing frames over.")
+@click.option(
+    "--fps", type=click.FloatRange(min=0, min_open=True), help="Of a folder of images, or to ask for."
+)
+@click.option("--exit", "leave", is_flag=True, help="End with the source.  [default: with Ctrl-C]")
+@click.option("--no-browser", is_flag=True, help="Only say where the page is.")
+@as_json
+@config_option
+@in_one_sentence
+def camera(source: str, **options: Any) -> int:
+    """Show SOURCE on a page of this computer, with what a task sees in it.
+
+    SOURCE is the number of a camera (0), a video file, a folder of images, a pattern (left*.jpg) or an
+    address (rtsp://…).  Pause, record and change the task on the page; Ctrl-C ends, and whatever was
+    recorded is complete.  With --json the summary of the session is printed at the end.
+    """
+    from factorlab.cli.stopping import stopping
+    from factorlab.live.camera import CameraSession, PageServer, TaskSettings, summary_of, task_choices
+    from vision3d.frames import open_frames
+
+    frames = open_frames(source, loop=options["loop"], fps=options["fps"])
+    session = CameraSession(
+        frames, task_choices(TaskSettings(options["dictionary"])), options["task"],
+        recordings=options["record"] or Path("recordings"), fast=options["fast"],
+    )  # fmt: skip
+    with stopping() as stop:
+        server = PageServer(session, options["port"])
+        try:
+            if options["record"] is not None:
+                session.start_recording()
+            session.start()
+            click.echo(f"live: {server.address}  (Ctrl-C ends)", err=True)
+            if not options["no_browser"]:
+                click.launch(server.address)
+            while not (stop.wait(0.1) or (options["leave"] and session.ended)):
+                pass
+        finally:
+            session.close()
+            server.close()
+    summary = summary_of(session)
+    if options["as_json"]:
+        print_json(summary)
+    return _told(summary, quiet=options["as_json"])
+
+
+def _told(summary: dict[str, Any], *, quiet: bool) -> int:
+    """Say how it ended."""
+    if not quiet:
+        click.echo(f"{summary['frames']} frames of {summary['source']}, {summary['worked_on']} worked on")
+    for one in summary["recordings"]:
+        lost = f", {one['lost']} lost: the disk is too slow" if one["lost"] else ""
+        click.echo(f"recorded: {one['frames']} frames in {one['folder']}{lost}", err=True)
+    for sentence in summary["left_out"]:
+        click.echo(f"warn: {sentence}", err=True)
+    faults = [summary["fault"], *(one["fault"] for one in summary["recordings"])]
+    for fault in filter(None, faults):
+        click.echo(f"error: {fault}", err=True)
+    return DATA_ERROR if any(faults) else 0

@@ -1,0 +1,81 @@
+"""The page in a browser: the picture moves, numbers arrive, buttons work, the console is silent."""
+
+import pytest
+from chromium import Chromium
+
+
+@pytest.fixture
+def window(browser, tmp_path):
+    with Chromium(browser, tmp_path / "profile") as one:
+        yield one
+        assert one.console == []
+
+
+PIXELS = """(() => {
+    const canvas = new OffscreenCanvas(picture.naturalWidth, picture.naturalHeight);
+    canvas.getContext("2d").drawImage(picture, 0, 0);
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    return data.reduce((sum, value, k) => (sum + value * (1 + (k % 8191))) % 1000000007, 0);
+})()"""
+
+
+def test_the_picture_and_the_numbers_of_markers(window, live, marker_video):
+    session, server = live(marker_video, loop=True)
+    session.start()
+    window.visit(server.address)
+    window.until("document.body.dataset.frame > 5")
+    window.until("picture.naturalWidth === 320 && picture.naturalHeight === 240")
+    window.until(f"{PIXELS} !== {window.run(PIXELS)}")
+    assert window.run("headline.textContent") == "2 markers"
+    cells = window.run("[...document.querySelectorAll('#tables td:first-child')].map(c => c.textContent)")
+    assert cells == ["3", "7"]
+    assert float(window.run("latency.textContent").split()[0]) < 1000
+    assert {address.rpartition("/")[0] + "/" for address in window.asked} == {server.address}
+
+
+def test_buttons_do_what_they_say(window, live, marker_video):
+    session, server = live(marker_video, loop=True)
+    session.start()
+    window.visit(server.address)
+    window.until("document.body.dataset.frame > 2")
+    window.click("#pause")
+    window.until("pause.textContent === 'Resume' && badge.textContent === 'paused'")
+    still = session.reader.count
+    window.click("#marks")
+    window.until("marks.getAttribute('aria-pressed') === 'false'")
+    assert session.reader.count <= still + 1
+    window.click("#pause")
+    window.until(f"document.body.dataset.frame > {still + 3}")
+    window.click("#record")
+    window.until("badge.textContent === '● REC' && parseFloat(recording.textContent) > 0.2")
+    window.click("#record")
+    window.until("recording.textContent.includes(' frames, ')")
+    assert session.recorded[0].frames > 3
+    window.click("#tasks button:nth-child(2)")
+    window.until("document.body.dataset.task === 'features' && headline.textContent.endsWith('corners')")
+
+
+def test_the_page_says_when_the_session_is_over(window, live, marker_video):
+    session, server = live(marker_video)
+    session.start()
+    window.visit(server.address)
+    window.until("badge.textContent === 'ended'")
+    window.click("#pause")  # now: play again
+    window.until("badge.hidden && document.body.dataset.frame >= 1")
+    session.close()
+    server.close()
+    window.until("fault.textContent.startsWith('factorlab live has ended')")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_paints_in_both_themes(window, live, marker_video, tmp_path, scheme):
+    session, server = live(marker_video, loop=True)
+    session.start()
+    window.emulate(scheme)
+    window.visit(server.address)
+    window.until("document.body.dataset.frame > 2")
+    assert window.run("document.documentElement.dataset.theme") == scheme
+    ground = window.run(r"getComputedStyle(document.body).backgroundColor.match(/\d+/g).map(Number)")
+    assert (sum(ground) < 150) == (scheme == "dark")
+    window.screenshot(tmp_path / "page.png")
+    assert (tmp_path / "page.png").stat().st_size > 20_000
