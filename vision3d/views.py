@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import NotFiniteError, ShapeError
 
-__all__ = ["View"]
+__all__ = ["Detections", "Missed", "View", "ViewAudit"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -72,3 +72,81 @@ class View:
             self.name, self.size, self.points[keep], self.pixels[keep], self.ids[keep], self.sigma_px[keep],
             self.findings,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Missed:
+    """An image in which the board was not found.
+
+    Parameters
+    ----------
+    name : of the image
+    reason : a sentence: what was looked for, what was seen instead, what to do
+    seen : columns and rows of the grid that was seen instead; None where there was none
+    """
+
+    name: str
+    reason: str
+    seen: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class ViewAudit:
+    """How far the points of one view can be trusted; rows go with those of the view.
+
+    Parameters
+    ----------
+    name : of the image
+    finder : what found the board
+    spacing_px : (N,) distance to the nearest neighbour
+    window_px : (N,) half-width of the window in which each point was refined
+    allowed_px : (N,) half-width of the largest window that keeps the neighbours out, 0.35 spacings
+    residuals : (N, 2) px against a plane seen through a radial distortion of the view's own; empty where
+        the view has too few points
+    scatter_px : standard deviation of a coordinate of those residuals; NaN where there are none
+    noise_px : the same as the noise of the pixels alone predicts
+    blur_px, contrast : standard deviation of the blur, and half the step from dark to light in grey levels
+        (medians); NaN where they are not measured
+    suspicious : ids of points whose residual is no chance
+    lost : ids of points that were found and could not be refined; they are not in the view
+    moved : ids and px of points that a forced window carries away from where they are
+    mirrored : the image is a mirror image
+    """
+
+    name: str
+    finder: str
+    spacing_px: Array
+    window_px: Array
+    allowed_px: Array
+    residuals: Array
+    scatter_px: float
+    noise_px: float
+    blur_px: float = float("nan")
+    contrast: float = float("nan")
+    suspicious: tuple[int, ...] = ()
+    lost: tuple[int, ...] = ()
+    moved: tuple[tuple[int, float], ...] = ()
+    mirrored: bool = False
+
+    @property
+    def window_too_large(self) -> bool:
+        """Whether a window reaches beyond what the spacing allows, by more than half a pixel."""
+        return bool(np.any(self.window_px > self.allowed_px + 0.5))
+
+
+@dataclass(frozen=True)
+class Detections:
+    """What a set of images says about a board.
+
+    Parameters
+    ----------
+    views : the images that show it
+    missed : the images that do not, each with its reason
+    audits : one for each view
+    findings : what is worth knowing about the set, a sentence each
+    """
+
+    views: tuple[View, ...]
+    missed: tuple[Missed, ...] = ()
+    audits: tuple[ViewAudit, ...] = ()
+    findings: tuple[str, ...] = ()

@@ -1,0 +1,155 @@
+"""Checkerboards in one image: found by growing their grid or by OpenCV, refined, and put in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision3d.boards import Checkerboard
+from vision3d.calibrate.detection.grid_growth import Grid, find_grids
+from vision3d.calibrate.detection.lattice import Array, Ids
+from vision3d.calibrate.detection.ordering import Cells, dark_first, laid_out, parity_sign, turned_towards
+from vision3d.calibrate.detection.refine import Refined, refine_saddles
+
+__all__ = ["Found", "NotFound", "find_checkerboard"]
+
+Grey = NDArray[np.uint8]
+
+AGREED = 0.8
+"""Mean agreement of the corners about the colour of the squares, below which a grid is no checkerboard."""
+WIDE_PX = 1200
+FILLED = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Refined points of a board: ids (N,) in order, `refined` row by row, and what found them."""
+
+    ids: Ids
+    refined: Refined
+    finder: str
+    lost: tuple[int, ...] = ()
+    dark_first: bool = True
+    mirrored: bool = False
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NotFound:
+    """What was seen instead of the board: columns and rows of a grid, or None."""
+
+    seen: tuple[int, int] | None = None
+    reason: str = ""
+
+
+def find_checkerboard(grey: Grey, board: Checkerboard) -> Found | NotFound:
+    """Find the inner corners of a board; refined, in order, corner 0 beside a dark square where one is.
+
+    Parameters
+    ----------
+    grey : (h, w)
+    board : what to look for
+    """
+    seen: list[Grid] = []
+    for blur_px in _blurs(grey):
+        for grid in find_grids(grey, blur_px)[:4]:
+            whole = grid.trimmed()
+            if sorted(whole.shape) == sorted(board.shape) and len(whole.cells) >= FILLED * board.count:
+                way = _filled(Cells(whole.pixels, whole.cells, whole.shape))
+                if (found := _settled(grey, way, board, "grown grid")) is not None:
+                    return found
+            elif min(whole.shape) >= 3:
+                seen.append(whole)
+    for name, pixels in _opencv(grey, board):
+        way = Cells(pixels, np.array(board.lattice), board.shape)
+        if (found := _settled(grey, way, board, name)) is not None:
+            return found
+    largest = max(seen, key=lambda grid: len(grid.cells), default=None)
+    if largest is None:
+        return NotFound()
+    columns, rows = largest.shape
+    return NotFound((max(columns, rows), min(columns, rows)))
+
+
+def _blurs(grey: Grey) -> tuple[float, ...]:
+    """Smoothings to try: fine ones for small squares, coarse ones for large or blurred images."""
+    return (1.5, 1.0, 3.0) if max(grey.shape) <= WIDE_PX else (2.0, 4.0, 1.2, 7.0)
+
+
+def _filled(way: Cells) -> Cells:
+    """The lattice with its holes filled by a homography through the other points."""
+    columns, rows = way.shape
+    if len(way.cells) == columns * rows:
+        return way
+    import cv2
+
+    every = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
+    there = np.zeros(columns * rows, dtype=np.bool_)
+    there[way.ids] = True
+    H = cv2.findHomography(way.cells.astype(np.float64), way.pixels, 0)[0]
+    pixels = np.asarray(cv2.perspectiveTransform(every[None].astype(np.float64), H)[0], dtype=np.float64)
+    offset = np.full((columns * rows, 2), np.nan)
+    offset[way.ids] = way.pixels - pixels[way.ids]
+    for hole in np.flatnonzero(~there):
+        near = np.argsort(np.sum((every - every[hole]) ** 2, axis=1) + 1e9 * ~there)[:4]
+        pixels[hole] += offset[near].mean(axis=0)
+    pixels[way.ids] = way.pixels
+    return Cells(pixels, every.astype(np.int64), way.shape)
+
+
+def _opencv(grey: Grey, board: Checkerboard) -> list[tuple[str, Array]]:
+    """What OpenCV finds: as the image is, equalised, at half and at twice its size."""
+    import cv2
+
+    from vision3d.cv import find_chessboard
+
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+    quick = flags | cv2.CALIB_CB_FAST_CHECK
+    columns, rows = board.shape
+    equalised = cv2.createCLAHE(3.0, (8, 8)).apply(grey)
+    tries = [("OpenCV", grey, 1.0), ("OpenCV, equalised", equalised, 1.0)]
+    if max(grey.shape) > 2 * WIDE_PX:
+        tries = []
+    if max(grey.shape) > WIDE_PX:
+        scale = 0.8 * WIDE_PX / max(grey.shape)
+        tries.append(("OpenCV, reduced", cv2.resize(grey, None, fx=scale, fy=scale,
+                                                    interpolation=cv2.INTER_AREA), scale))  # fmt: skip
+    for name, image, scale in tries:
+        whole, pixels = find_chessboard(image, columns, rows, flags=quick if "equal" in name else flags)
+        if whole and len(pixels) == board.count:
+            return [(name, (pixels + 0.5) / scale - 0.5)]
+    whole, pixels = find_chessboard(grey, columns, rows, sector_based=True)
+    return [("OpenCV, sector based", pixels)] if whole and len(pixels) == board.count else []
+
+
+def _settled(grey: Grey, way: Cells, board: Checkerboard, finder: str) -> Found | None:
+    """Refine and put in order; None where the corners do not agree on the colours of the squares."""
+    ways = laid_out(way, board.shape)
+    if not ways:
+        return None
+    first = ways[0]
+    refined = refine_saddles(grey, first.pixels, first.ids, first.shape)
+    good = np.isfinite(refined.sigma_px)
+    if good.sum() < FILLED * board.count:
+        return None
+    sign = parity_sign(first.cells[good], refined.contrast[good])
+    if abs(sign) < AGREED:
+        return None
+    wrong = good & (np.sign(refined.contrast) * (1.0 - 2.0 * (first.cells.sum(axis=1) % 2)) * sign < 0.0)
+    good &= ~wrong
+    possible, dark = dark_first(ways, first, sign)
+    ids = turned_towards(possible).ids
+    order = np.argsort(ids)
+    kept = order[good[order]]
+    return Found(
+        ids=ids[kept],
+        refined=Refined(
+            refined.pixels[kept], refined.sigma_px[kept], refined.contrast[kept], refined.blur_px[kept],
+            refined.reach_px[kept],
+        ),
+        finder=finder,
+        lost=tuple(int(i) for i in np.sort(ids[~good])),
+        dark_first=dark,
+    )  # fmt: skip

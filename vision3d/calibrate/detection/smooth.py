@@ -1,0 +1,128 @@
+"""Whether the points of one view lie as the points of a board can: a plane seen through a radial distortion.
+
+The model has the eight numbers of a homography, three of a radial distortion, and its centre, expected
+near the middle of the image; fitted to the view alone, robustly, what is left of each corner is its residual.
+It needs no camera, so that it can be said of a single image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision3d.calibrate.detection.lattice import Array
+
+__all__ = ["Smooth", "fit_smooth"]
+
+RADIAL_FROM, PLAIN_FROM = 20, 6
+"""Points from which the distortion is fitted as well, and from which anything is."""
+PLAIN_STEPS, STEPS = 12, 24
+"""Least squares to its end first: points that a half-way model cannot explain would lose their weight."""
+MOST_FREE = 0.9
+PRIOR_PX = 0.05
+"""A centre off the middle by a quarter of the image's radius weighs as much as this error of a point."""
+
+
+@dataclass(frozen=True, slots=True)
+class Smooth:
+    """What is left of each point, and how much of it is the fit's own doing.
+
+    Attributes
+    ----------
+    residuals : (N, 2) px
+    leverage : (N,) between 0 (the point decides nothing) and 1 (the fit follows it)
+    scale_px : standard deviation of a coordinate, from the middle of the residuals
+    """
+
+    residuals: Array
+    leverage: Array
+    scale_px: float
+
+
+def fit_smooth(points: Array, pixels: Array, size: tuple[int, int]) -> Smooth | None:
+    """Fit the model to points (N, 3) m and pixels (N, 2); None where there are too few points."""
+    n = len(pixels)
+    if n < PLAIN_FROM:
+        return None
+    flat = _centred(points[:, :2])
+    middle, radius = 0.5 * (np.array(size, dtype=np.float64) - 1.0), 0.5 * float(np.hypot(*size))
+    target = (pixels - middle) / radius
+    free = 13 if n >= RADIAL_FROM else 8
+    q = np.concatenate([_homography(flat, target), np.zeros(5)])
+    weights = np.ones(n)
+    prior = np.zeros(free)
+    prior[11:] = (PRIOR_PX / radius / 0.25) ** 2
+    for step in range(STEPS):
+        r, J = _linearise(q, flat, target, free)
+        scale = max(_scale(r, n, free), 1e-7)
+        if step >= PLAIN_STEPS:
+            weights = _tukey(np.linalg.norm(r, axis=1) / (scale * 4.685))
+        A = np.einsum("n,nik,nil->kl", weights, J, J)
+        A[np.diag_indices(free)] *= 1.0 + 1e-9
+        A += np.diag(prior)
+        g = np.einsum("n,nik,ni->k", weights, J, r) - prior * q[:free]
+        q[:free] += np.linalg.lstsq(A, g, rcond=1e-14)[0]
+    r, J = _linearise(q, flat, target, free)
+    inverse = np.linalg.pinv(np.einsum("n,nik,nil->kl", weights, J, J) + np.diag(prior), rcond=1e-14)
+    hat = np.einsum("n,nik,kl,nil->n", weights, J, inverse, J) / 2.0
+    return Smooth(r * radius, np.clip(hat, 0.0, MOST_FREE), _scale(r, n, free) * radius)
+
+
+def _centred(xy: Array) -> Array:
+    moved = xy - xy.mean(axis=0)
+    scaled: Array = moved / max(float(np.abs(moved).max()), 1e-12)
+    return scaled
+
+
+def _homography(xy: Array, target: Array) -> Array:
+    """Eight numbers of the homography that takes xy to target, last entry 1, by least squares."""
+    x, y = xy.T
+    one, nil = np.ones_like(x), np.zeros_like(x)
+    rows = []
+    for k in range(2):
+        t = target[:, k]
+        head = [x, y, one, nil, nil, nil] if k == 0 else [nil, nil, nil, x, y, one]
+        rows.append(np.stack([*head, -t * x, -t * y], axis=1))
+    solution: Array = np.linalg.lstsq(np.concatenate(rows), target.T.reshape(-1), rcond=None)[0]
+    return solution
+
+
+def _linearise(q: Array, xy: Array, target: Array, free: int) -> tuple[Array, Array]:
+    """Residual target - model (N, 2) and the Jacobian of the model (N, 2, free)."""
+    x, y = xy.T
+    depth = q[6] * x + q[7] * y + 1.0
+    u, v = (q[0] * x + q[1] * y + q[2]) / depth, (q[3] * x + q[4] * y + q[5]) / depth
+    a, b = u - q[11], v - q[12]
+    rho = a * a + b * b
+    gain = 1.0 + rho * (q[8] + rho * (q[9] + rho * q[10]))
+    slope = 2.0 * (q[8] + rho * (2.0 * q[9] + 3.0 * rho * q[10]))
+    one, nil = np.ones_like(x), np.zeros_like(x)
+    du = np.stack([x, y, one, nil, nil, nil, -u * x, -u * y], axis=1) / depth[:, None]
+    dv = np.stack([nil, nil, nil, x, y, one, -v * x, -v * y], axis=1) / depth[:, None]
+    along = a[:, None] * du + b[:, None] * dv
+    J = np.empty((len(x), 2, 13))
+    J[:, 0, :8] = gain[:, None] * du + (slope * a)[:, None] * along
+    J[:, 1, :8] = gain[:, None] * dv + (slope * b)[:, None] * along
+    for k in range(3):
+        J[:, 0, 8 + k], J[:, 1, 8 + k] = a * rho ** (k + 1), b * rho ** (k + 1)
+    for k, (e, f) in enumerate(((1.0, 0.0), (0.0, 1.0))):
+        toward = slope * (a * e + b * f)
+        J[:, 0, 11 + k] = e * (1.0 - gain) - a * toward
+        J[:, 1, 11 + k] = f * (1.0 - gain) - b * toward
+    model = np.stack([q[11] + gain * a, q[12] + gain * b], axis=1)
+    return target - model, J[:, :, :free]
+
+
+def _scale(r: Array, n: int, free: int) -> float:
+    """Standard deviation of a coordinate from the median of the absolute residuals."""
+    freedom = max((2 * n - free) / (2 * n), 0.1)
+    return float(1.4826 * np.median(np.abs(r)) / np.sqrt(freedom))
+
+
+def _tukey(distance: NDArray[np.float64]) -> Array:
+    """Tukey's biweight of a distance in cuts."""
+    inside = np.clip(1.0 - distance**2, 0.0, 1.0)
+    weights: Array = np.maximum(inside**2, 1e-6)
+    return weights
