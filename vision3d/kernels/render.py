@@ -110,6 +110,28 @@ def area(polygon, count):
 
 
 @inlined
+def below_zero(d0, d1, d2, d3):
+    """The share of a pixel where a distance is negative, from its corners, taking it as linear between."""
+    middle = 0.25 * (d0 + d1 + d2 + d3)
+    a = 0.5 * abs(d1 + d2 - d0 - d3)  # how much it changes across the pixel, and down
+    b = 0.5 * abs(d2 + d3 - d0 - d1)
+    wide, narrow = max(a, b), max(min(a, b), 1e-15)
+    # the sum of two even spreads has a distribution that rises as a trapezium
+    t = -middle
+    low = t + 0.5 * (wide + narrow)
+    if low <= 0.0:
+        return 0.0
+    if t >= 0.5 * (wide + narrow):
+        return 1.0
+    if t <= -0.5 * (wide - narrow):
+        return 0.5 * low * low / (wide * narrow)
+    if t < 0.5 * (wide - narrow):
+        return (0.5 * narrow + t + 0.5 * (wide - narrow)) / wide
+    rest = 0.5 * (wide + narrow) - t
+    return 1.0 - 0.5 * rest * rest / (wide * narrow)
+
+
+@inlined
 def first_cell(lowest, edges):
     """The cell in which a polygon begins, -1 before the first edge."""
     if lowest < edges[0]:
@@ -234,6 +256,13 @@ def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, values, radii, in
                         image[i, j] = value
                     continue
                 straight = False
+                if kind == DISTANCE and flat:
+                    d1 = float(interpolated(x1, y1, x_edges, y_edges, values))
+                    d2 = float(interpolated(x2, y2, x_edges, y_edges, values))
+                    d3 = float(interpolated(x3, y3, x_edges, y_edges, values))
+                    share = below_zero(away, d1, d2, d3)
+                    image[i, j] = share * inner[0, 0] + (1.0 - share) * inner[0, 1]
+                    continue
             if straight and flat:
                 # a disc in one of the cells may be near, too
                 for corner in (code, codes[past, j + 1], codes[now, j], codes[now, j + 1]):
