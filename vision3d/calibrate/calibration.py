@@ -53,7 +53,13 @@ class Calibration:
     camera : Camera
         Lens, parameters and image size.
     cov : Array
-        Covariance of `camera.parameters`, (p, p); zero rows for parameters that were held.
+        Covariance of `camera.parameters`, (p, p).  Where the corners of one view err together, the scatter
+        of the views is in it: see `vision3d.calibrate.covariance`.
+    cov_independent : Array
+        The same if the corners' errors were independent: what OpenCV and others state.
+    inflation : float
+        Standard deviations in `cov` over those in `cov_independent`, root of the mean square; 1 where
+        independent errors explain the scatter of the views.
     poses : Array
         `camera_T_board` of every view, (V, 7).
     pose_covs : Array
@@ -79,7 +85,7 @@ class Calibration:
     sigma_px : float
         Standard deviation of a typical corner, per axis.
     rms_px : float
-        Root mean square distance (OpenCV's definition) over the corners that were used.
+        Root mean square distance (OpenCV's definition) over the corners that count in full.
     rms_all_px : float
         The same over all corners.
     view_rms : Array
@@ -94,6 +100,8 @@ class Calibration:
 
     camera: Camera
     cov: Array
+    cov_independent: Array
+    inflation: float
     poses: Array
     pose_covs: Array
     pose_follows: Array

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from sequential.errors import UnderConstrainedError
 from sequential.manifold.quaternion import rotation_matrix
-from vision3d.calibrate.adjustment import schur
 from vision3d.calibrate.calibration import Calibration, SolveReport
+from vision3d.calibrate.covariance import Covariances, covariances
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.robust import Trusted
-from vision3d.camera import LENSES, Camera
+from vision3d.camera import Camera
 from vision3d.views import View
 
 __all__ = ["result_of"]
@@ -38,30 +38,42 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     used = relative > 0.0
     freedom = max(2 * int(used.sum()) - int(free.sum()) - 6 * problem.count, 1)
     scale = float(np.sqrt(2.0 * solution.cost / freedom))
-    joint, alone, follows, condition, weakest = _covariances(trusted, free, problem, scale)
-    p = len(unknowns.parameters)
+    known = covariances(solution.blocks, free, scale)
+    p, follows = len(unknowns.parameters), known.pose_follows
+    focal = float((np.sqrt(np.diag(known.independent)[:2]) / unknowns.parameters[:2]).max())
+    if not focal < FREE_FOCAL:
+        raise UnderConstrainedError(_missing(problem, unknowns.poses, focal))
     camera = Camera(unknowns.lens, unknowns.parameters[:4], unknowns.parameters[4:], problem.size)
-    pose_covs = alone + np.einsum("vip,pq,vjq->vij", follows, joint, follows)
+    pose_covs = known.pose_alone + np.einsum("vip,pq,vjq->vij", follows, known.joint, follows)
     squares = np.sum(residuals**2, axis=1)
     view_rms = np.sqrt([np.mean(one) for one in problem.split(squares)])
     owner = problem.owner
     numbers = np.concatenate([view.ids for view in views])
     left_out = tuple((int(owner[i]), int(numbers[i])) for i in np.flatnonzero(~used))
-    rms = float(np.sqrt(np.mean(squares[used])))
-    findings = _findings(views, camera, trusted, left_out, view_rms, np.sqrt(np.diag(joint)), condition)
+    rms = float(np.sqrt(np.mean(squares[relative == 1.0])))
+    findings = _findings(views, camera, trusted, left_out, view_rms, known)
     message = (
         f"{camera.lens}: {len(views)} views, {int(used.sum())} of {len(used)} corners, RMS {rms:.3f} px, "
         f"{'settled' if solution.converged else 'not settled'} after {trusted.iterations} steps"
     )
-    report = SolveReport(message, solution.converged, trusted.iterations, condition, weakest, findings)
+    report = SolveReport(
+        message,
+        solution.converged,
+        trusted.iterations,
+        known.condition,
+        _names(known.weakest, camera),
+        findings,
+    )
     return Calibration(
         camera=camera,
-        cov=joint[:p, :p].copy(),
+        cov=known.joint[:p, :p].copy(),
+        cov_independent=known.independent[:p, :p].copy(),
         poses=unknowns.poses,
         pose_covs=pose_covs,
         pose_follows=follows,
-        pose_alone=alone,
-        joint_cov=joint,
+        pose_alone=known.pose_alone,
+        joint_cov=known.joint,
+        inflation=known.inflation,
         warp=unknowns.warp,
         views=views,
         residuals=problem.split(residuals),
@@ -75,29 +87,6 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
         outlier_views=trusted.outlier_views,
         report=report,
     )
-
-
-def _covariances(
-    trusted: Trusted, free: Mask, problem: Problem, scale: float
-) -> tuple[Array, Array, Array, float, str]:
-    """Joint covariance (q, q), poses' own (V, 6, 6), how they follow (V, 6, q), condition, weakest."""
-    blocks, unknowns = trusted.solution.blocks, trusted.solution.unknowns
-    S, _, T_inverse, Y = schur(blocks, free)
-    sizes = np.sqrt(np.maximum(np.diag(S), 1e-300))
-    values, vectors = np.linalg.eigh(S / sizes[:, None] / sizes[None, :])
-    names = np.array([*LENSES[unknowns.lens].parameters, "wx", "wy"])
-    share = np.abs(vectors[:, 0])
-    weakest = ", ".join(names[free][share > 0.5 * share.max()])
-    condition = float(values[-1] / values[0]) if values[0] > 0.0 else np.inf
-    cov = (vectors / np.maximum(values, 1e-300)) @ vectors.T / sizes[:, None] / sizes[None, :] * scale**2
-    focal = float(np.sqrt(np.abs(np.diag(cov)[:2])).max() / unknowns.parameters[:2].min())
-    if not focal < FREE_FOCAL:
-        raise UnderConstrainedError(_missing(problem, unknowns.poses, focal))
-    joint = np.zeros((len(free), len(free)))
-    joint[np.ix_(free, free)] = 0.5 * (cov + cov.T)
-    follows = np.zeros((problem.count, 6, len(free)))
-    follows[:, :, free] = Y
-    return joint, scale**2 * T_inverse, follows, condition, weakest
 
 
 def _missing(problem: Problem, poses: Array, focal: float) -> str:
@@ -120,8 +109,7 @@ def _findings(
     trusted: Trusted,
     left_out: tuple[tuple[int, int], ...],
     view_rms: Array,
-    std: Array,
-    condition: float,
+    known: Covariances,
 ) -> tuple[str, ...]:
     """Sentences about what a user should know."""
     found: list[str] = []
@@ -141,19 +129,32 @@ def _findings(
         "the picture was flipped"
         for v in _from_behind(trusted.solution.unknowns.poses, views)
     )
+    std = np.sqrt(np.diag(known.joint))
+    if known.inflation > 1.0:
+        found.append(
+            "the corners of one view err together (a board that is not quite flat, a lens that is not quite "
+            f"the model): standard deviations are {known.inflation:.1f}x those of independent corners"
+        )
     if (std[:2] > WEAK_FOCAL * camera.parameters[:2]).any():
         share = 100.0 * float((std[:2] / camera.parameters[:2]).max())
         found.append(
-            f"the views hardly determine the focal length (standard deviation {share:.1f} %); add tilted views"
+            f"the views hardly determine the focal length (standard deviation {share:.1f} %): add tilted ones"
         )
-    if condition > ILL:
+    if known.condition > ILL:
         found.append(
-            f"some parameters can trade places with each other (condition {condition:.0e}): read the "
+            f"some parameters can trade places with each other (condition {known.condition:.0e}): read the "
             "uncertainty of projections, not of single coefficients, or take a lens with fewer coefficients"
         )
     if (fold := camera.check_monotonic()).inside:
         found.append(str(fold))
     return tuple(found)
+
+
+def _names(weakest: Array, camera: Camera) -> str:
+    """Parameters that take part in a direction."""
+    share = np.abs(weakest)
+    names = (*camera.names, "warp x", "warp y")
+    return ", ".join(name for name, part in zip(names, share, strict=True) if part > 0.5 * share.max())
 
 
 def _from_behind(poses: Array, views: tuple[View, ...]) -> list[int]:

@@ -31,7 +31,7 @@ FLAT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Focal length, px; law of projection; poses (V, 7); what they leave of the corners, (M, 2), and its RMS."""
+    """Focal length, px; law of projection; poses (V, 7); what they leave of corners, (M, 2), and its RMS."""
 
     focal: float
     equidistant: bool
