@@ -1,0 +1,154 @@
+"""Files of OpenCV's FileStorage: YAML, XML or JSON, under the names that its programs and tutorials use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sequential.errors import FileFormatError, ModelError, ShapeError
+from vision3d.camera import Camera
+from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, number
+from vision3d.camera_files.opencv_vector import lens_of_vector, split_matrix
+
+__all__ = ["opencv_cameras", "opencv_text"]
+
+NAMES = (
+    ("camera", "camera_matrix", "distortion_coefficients"),
+    ("camera", "camera_matrix", "dist_coeffs"),
+    ("camera", "camera_matrix", "distortion"),
+    ("camera", "cameraMatrix", "distCoeffs"),
+    ("camera", "Camera_Matrix", "Distortion_Coefficients"),
+    ("camera", "CameraMat", "DistCoeff"),
+    ("camera", "K", "D"),
+    ("camera", "M", "D"),
+    ("left", "M1", "D1"),
+    ("right", "M2", "D2"),
+    ("left", "K1", "D1"),
+    ("right", "K2", "D2"),
+    ("left", "cameraMatrix1", "distCoeffs1"),
+    ("right", "cameraMatrix2", "distCoeffs2"),
+)
+"""Camera, matrix and distortion, as they are called in files."""
+SIZES = (("image_width", "image_height"), ("image_Width", "image_Height"), ("width", "height"))
+SIZE_LISTS = ("image_size", "imageSize", "ImageSize", "size", "resolution")
+
+
+def opencv_text(camera: Camera, name: str = "camera") -> str:
+    """The file of a camera, as OpenCV's own calibration program names things.  Every lens can be said."""
+    vector = camera.distortion_opencv
+    fisheye = ["fisheye_model: 1"] if camera.lens == "fisheye4" else []
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"{LENS_COMMENT}{camera.lens}",
+        f"camera_name: {name}",
+        f"image_width: {camera.size[0]}",
+        f"image_height: {camera.size[1]}",
+        *fisheye,
+        *_matrix("camera_matrix", camera.matrix),
+        *_matrix("distortion_coefficients", vector[:, None]),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def opencv_cameras(path: Path, text: str, where: str, size: tuple[int, int] | None) -> dict[str, Camera]:
+    """The cameras of a file, by `camera`, or `left` and `right`.
+
+    Raises
+    ------
+    FileFormatError
+        where OpenCV cannot read it, or none of the names is in it.
+    """
+    import cv2
+
+    from vision3d.frames.source import quiet
+
+    storage = None
+    try:
+        with quiet():
+            storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+            keys = set(storage.root().keys()) if storage.isOpened() else set()
+            content = {key: _value(storage.getNode(key)) for key in keys}
+    except (cv2.error, SystemError) as error:
+        raise FileFormatError(f"{where} is damaged: OpenCV cannot read it") from error
+    finally:
+        if storage is not None:
+            storage.release()
+    if "Camera.fx" in content or "Camera1.fx" in content:
+        return {"camera": _orb_slam(content, where, size)}
+    found = {}
+    for name, matrix, vector in NAMES:
+        if name not in found and isinstance(content.get(matrix), np.ndarray):
+            distortion = content.get(vector)
+            found[name] = _camera(where, content, content[matrix], distortion, size, text)
+    if not found:
+        listed = ", ".join(sorted(content)[:8]) or "nothing"
+        raise FileFormatError(f"{where} has no camera_matrix (nor cameraMatrix, K, M1 …); it holds {listed}")
+    return found
+
+
+def _camera(
+    where: str, content: dict[str, Any], matrix: Any, distortion: Any, size: tuple[int, int] | None, text: str
+) -> Camera:
+    wanted = commented_lens(text)
+    fisheye = bool(content.get("fisheye_model")) or wanted == "fisheye4"
+    try:
+        lens, vector = lens_of_vector(distortion, "fisheye4" if fisheye else None)
+        intrinsics = split_matrix(matrix)
+    except (ModelError, ShapeError) as error:
+        raise FileFormatError(f"{where}: {error}") from error
+    return built(where, lens, intrinsics, vector.tolist(), _size(content) or size, wanted)
+
+
+def _size(content: dict[str, Any]) -> tuple[int, int] | None:
+    for width, height in SIZES:
+        if width in content and height in content:
+            return int(content[width]), int(content[height])
+    for key in SIZE_LISTS:
+        given = np.ravel(content.get(key, []))
+        if given.size == 2 and given.dtype.kind in "if":
+            return int(given[0]), int(given[1])
+    return None
+
+
+def _orb_slam(content: dict[str, Any], where: str, size: tuple[int, int] | None) -> Camera:
+    """Settings of ORB-SLAM: one number an entry."""
+    prefix = "Camera1." if "Camera1.fx" in content else "Camera."
+    own = {key.removeprefix(prefix): value for key, value in content.items() if key.startswith(prefix)}
+    fisheye = content.get("Camera.type") == "KannalaBrandt8"
+    order = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")
+    coefficients = [float(own.get(name, 0.0)) for name in order]
+    lens = "fisheye4" if fisheye else "brown5"
+    try:
+        intrinsics = [float(own[name]) for name in ("fx", "fy", "cx", "cy")]
+    except KeyError as error:
+        raise FileFormatError(f"{where} has no {prefix}{error.args[0]}") from error
+    sides = [content.get(f"Camera.{side}") for side in ("width", "height")]
+    told = (int(sides[0]), int(sides[1])) if sides[0] and sides[1] else size
+    return built(where, lens, intrinsics, coefficients, told, None)
+
+
+def _value(node: Any) -> Any:
+    """A matrix, a number, a text or a list of numbers."""
+    if node.isMap():
+        matrix = node.mat()
+        return None if matrix is None else np.asarray(matrix, dtype=np.float64)
+    if node.isSeq():
+        return [_value(node.at(i)) for i in range(node.size())]
+    if node.isInt() or node.isReal():
+        return node.real()
+    return node.string() if node.isString() else None
+
+
+def _matrix(key: str, matrix: Any) -> list[str]:
+    rows, columns = matrix.shape
+    data = ", ".join(number(value) for value in matrix.ravel())
+    return [
+        f"{key}: !!opencv-matrix",
+        f"   rows: {rows}",
+        f"   cols: {columns}",
+        "   dt: d",
+        f"   data: [ {data} ]",
+    ]
