@@ -6,7 +6,10 @@ tests hold the three equal.
 """
 
 from vision3d.image.borders import Border, pad
+from vision3d.image.colour import grey, hsv, lab
 from vision3d.image.components import Components, connected_components
+from vision3d.image.corners import corners, harris
+from vision3d.image.edges import Lines, canny, hough_lines
 from vision3d.image.filters import box_blur, box_sums, convolve, correlate
 from vision3d.image.gradients import Gradient, derivative_kernels, gradient, sobel
 from vision3d.image.levels import adaptive_threshold, equalise, histogram, otsu, threshold
@@ -27,12 +30,15 @@ __all__ = [
     "Components",
     "Gradient",
     "Image",
+    "Lines",
     "adaptive_threshold",
     "box_blur",
     "box_sums",
+    "canny",
     "closing",
     "connected_components",
     "convolve",
+    "corners",
     "correlate",
     "derivative_kernels",
     "dilate",
@@ -41,7 +47,12 @@ __all__ = [
     "gaussian_blur",
     "gaussian_kernel",
     "gradient",
+    "grey",
+    "harris",
     "histogram",
+    "hough_lines",
+    "hsv",
+    "lab",
     "morphological_gradient",
     "opening",
     "otsu",
