@@ -104,6 +104,14 @@ class Camera:
         """The same lens and size with other parameters (4+k,)."""
         return Camera(self.lens, parameters[:4], parameters[4:], self.size)
 
+    def resized(self, size: Sequence[int]) -> Camera:
+        """The camera of its images after they were scaled to (width, height)."""
+        sx, sy = size[0] / self.size[0], size[1] / self.size[1]
+        fx, fy, cx, cy = self.intrinsics
+        # corners of images coincide, and the first pixel's centre is half a pixel from its corner
+        scaled = (fx * sx, fy * sy, (cx + 0.5) * sx - 0.5, (cy + 0.5) * sy - 0.5)
+        return Camera(self.lens, scaled, self.distortion, size)
+
     @cached_property
     def matrix(self) -> Array:
         """(3, 3) camera matrix K; read-only."""
