@@ -18,6 +18,11 @@ COMMANDS = {
     "imu": ("factorlab.cli.calibrate_imu", "imu", "Both, from one multi-position recording."),
     "mag": ("factorlab.cli.calibrate_field", "mag", "Magnetometer, from turns in every direction."),
     "range": ("factorlab.cli.calibrate_field", "range_sensor", "Distance sensor v = a/(d+b)+c."),
+    "camera": (
+        "factorlab.cli.calibrate_camera",
+        "camera",
+        "Camera, from pictures of a checkerboard, ChArUco or circles.",
+    ),
     "ferraris": ("factorlab.cli.calibrate_field", "ferraris", "Six positions and three known turns."),
 }
 

@@ -1,0 +1,80 @@
+"""The numbers of a camera's calibration for a machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from factorlab.camera.calibrated import CalibratedCamera
+
+__all__ = ["numbers_of"]
+
+
+def numbers_of(done: CalibratedCamera) -> dict[str, Any]:
+    """What `report.json` and `--json` say besides verdicts."""
+    fit = done.calibration
+    camera = fit.camera
+    values, stds = camera.parameters.tolist(), fit.std.tolist()
+    return {
+        "board": done.settings.board.name,
+        "views": {
+            "given": done.given,
+            "used": len(fit.views),
+            "left_out": done.lost,
+            "table": [_view(done, k) for k in range(len(fit.views))],
+        },
+        "detection": _detection(done),
+        "rms_px": fit.rms_px,
+        "leave_one_out_rms_px": None if done.cross is None else done.cross.rms_px,
+        "sigma_px": fit.sigma_px,
+        "camera": {
+            "lens": camera.lens,
+            "size": list(camera.size),
+            "parameters": dict(zip(fit.names, values, strict=True)),
+            "std": dict(zip(fit.names, stds, strict=True)),
+            "covariance": fit.cov.tolist(),
+            "matrix": camera.matrix.tolist(),
+        },
+        "outliers": {
+            "corners": [{"picture": fit.views[view].name, "corner": corner} for view, corner in fit.outliers],
+            "pictures": [fit.views[view].name for view in fit.outlier_views],
+        },
+        "condition": fit.report.condition,
+        "findings": list(fit.report.findings),
+        "seconds": done.seconds,
+    }
+
+
+def _detection(done: CalibratedCamera) -> dict[str, Any]:
+    """What the audit of the corners says."""
+    audits = done.detections.audits
+    return {
+        "window_px": done.settings.window,
+        "window_too_large": [audit.name for audit in audits if audit.window_too_large],
+        "moved": [
+            {"picture": audit.name, "corner": corner, "by_px": px}
+            for audit in audits
+            for corner, px in audit.moved
+        ],
+        "suspicious": [
+            {"picture": audit.name, "corner": corner} for audit in audits for corner in audit.suspicious
+        ],
+        "findings": list(done.detections.findings),
+    }
+
+
+def _view(done: CalibratedCamera, k: int) -> dict[str, Any]:
+    fit, view = done.calibration, done.calibration.views[k]
+    return {
+        "picture": view.name,
+        "corners": len(view),
+        "left_out": int((~done.used[k]).sum()),
+        "rms_px": float(fit.view_rms[k]),
+        "predicted_rms_px": None if done.cross is None else float(done.cross.view_rms[k]),
+        "tilt_deg": float(np.degrees(done.tilts[k])),
+        "distance_m": float(done.distances[k]),
+        "camera_T_board": fit.poses[k].tolist(),
+        "std": np.sqrt(np.diag(fit.pose_covs[k])).tolist(),
+        "findings": list(view.findings),
+    }

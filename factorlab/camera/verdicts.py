@@ -1,0 +1,155 @@
+"""What a camera's calibration is worth, in verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factorlab.camera.calibrated import CalibratedCamera
+from factorlab.report.document import Status, Verdict
+
+__all__ = ["judged", "verdicts_of"]
+
+GOOD_RATIO, FAIR_RATIO = 1.15, 1.6  # left-out views over fitted ones: good, and still of use
+GOOD_FOCAL, FAIR_FOCAL = 0.002, 0.01  # standard deviation of the focal length, relative
+STEEP, FLAT = np.radians(25.0), np.radians(12.0)  # largest tilt of the board: good, and too little
+GOOD_PX, FAIR_PX = 0.5, 2.0  # projection uncertainty where the image is worst
+GOOD_SCATTER, FAIR_SCATTER = 0.5, 1.5  # RMS of residuals, px
+ENOUGH_VIEWS = 8
+TILT_MORE = "tilt the board by 30 to 45° about its vertical and its horizontal axis"
+
+
+def verdicts_of(done: CalibratedCamera) -> tuple[Verdict, ...]:
+    """Pictures, corners, residuals, left-out views, lens, uncertainty, poses: in the order of a reader."""
+    found = [_pictures(done), *_window(done), *_corners(done), _residuals(done)]
+    found += [*_left_out(done), _fold(done), _focal(done), *_projection(done)]
+    found += [_tilt(done), *_others(done)]
+    return tuple(found)
+
+
+def _pictures(done: CalibratedCamera) -> Verdict:
+    """How many took part."""
+    used, given = len(done.calibration.views), done.given
+    status: Status = "PASS" if used >= ENOUGH_VIEWS and used == given else "WARN"
+    lost = list(done.lost)
+    meaning = "the board is found in every one"
+    if lost:
+        meaning = f"not in {', '.join(lost[:4])}{f' and {len(lost) - 4} more' if len(lost) > 4 else ''}"
+    action = "" if used >= ENOUGH_VIEWS else "take 10 to 20 pictures"
+    return Verdict("pictures used", used, None, status, meaning, action, f"of {given}")
+
+
+def _window(done: CalibratedCamera) -> list[Verdict]:
+    """Whether a forced window is too large for the squares."""
+    if (window := done.settings.window) is None:
+        return []
+    metric = f"corner window ±{window} px"
+    large = [audit for audit in done.detections.audits if audit.window_too_large]
+    if not large:
+        return [
+            Verdict(metric, None, None, "PASS", "smaller than 0.35 of the distance of corners everywhere")
+        ]
+    moved = sum(len(audit.moved) for audit in large)
+    farthest = max((px for audit in large for _, px in audit.moved), default=0.0)
+    spacing = min(float(audit.spacing_px.min()) for audit in large)
+    meaning = (
+        f"too large in {len(large)} of {len(done.detections.audits)} pictures, where corners are only "
+        f"{spacing:.0f} px apart: it moves {moved} corners by up to {farthest:.1f} px"
+    )
+    names = ", ".join(audit.name for audit in large if audit.moved)
+    action = f"leave --window out{f' (worst: {names})' if names else ''}"
+    return [Verdict(metric, moved, None, "FAIL" if moved else "WARN", meaning, action, "corners moved")]
+
+
+def _corners(done: CalibratedCamera) -> list[Verdict]:
+    """Corners that the audit or the fit does not believe."""
+    fit = done.calibration
+    total, lost = fit.corner_count, len(fit.outliers)
+    share = lost / max(total, 1)
+    status: Status = "PASS" if share <= 0.01 else "WARN" if share <= 0.1 else "FAIL"
+    if not lost:
+        return [Verdict("corners left out", 0, None, "PASS", f"noise explains all of {total}")]
+    pictures = list(dict.fromkeys(fit.views[view].name for view, _ in fit.outliers))
+    where = f"{', '.join(pictures[:4])}{' …' if len(pictures) > 4 else ''}"
+    meaning = f"of {total}, in {where}: noise does not explain them"
+    action = "look at the cut-outs below: glare, a finger, blur" if status != "PASS" else ""
+    return [Verdict("corners left out", lost, None, status, meaning, action)]
+
+
+def _residuals(done: CalibratedCamera) -> Verdict:
+    fit = done.calibration
+    status = judged(fit.rms_px, GOOD_SCATTER, FAIR_SCATTER)
+    meaning = (
+        f"distance from where the camera predicts a corner; σ of a coordinate {fit.sigma_px:.3f} px, "
+        f"{fit.sigma_scale:.2f} times what the pixels promise"
+    )
+    action = "" if status == "PASS" else "a flat board, sharp pictures, no motion; is the lens model right?"
+    return Verdict("residual, RMS", fit.rms_px, None, status, meaning, action, "px")
+
+
+def _left_out(done: CalibratedCamera) -> list[Verdict]:
+    if done.cross is None:
+        meaning = "with three views or fewer none can be left out to check the others"
+        return [Verdict("left-out pictures, RMS", None, None, "WARN", meaning, "take 10 to 20 pictures")]
+    ratio = done.cross.rms_px / max(done.cross.train_rms_px, 1e-12)
+    status = judged(ratio, GOOD_RATIO, FAIR_RATIO)
+    meaning = f"each picture predicted by a camera that has not seen it: {ratio:.3f} times the residual"
+    action = "" if status == "PASS" else "more pictures, or a lens with fewer coefficients: this one overfits"
+    return [Verdict("left-out pictures, RMS", done.cross.rms_px, None, status, meaning, action, "px")]
+
+
+def _fold(done: CalibratedCamera) -> Verdict:
+    fold = done.calibration.camera.check_monotonic()
+    if fold.inside:
+        action = "put corners into the corners of the image, or take a lens with fewer coefficients"
+        return Verdict("distortion", None, None, "FAIL", str(fold), action)
+    return Verdict("distortion", None, None, "PASS", str(fold))
+
+
+def _focal(done: CalibratedCamera) -> Verdict:
+    fit = done.calibration
+    fx, fy = fit.camera.intrinsics[:2]
+    relative = float(max(fit.std[0] / fx, fit.std[1] / fy))
+    status = judged(relative, GOOD_FOCAL, FAIR_FOCAL)
+    meaning = f"fx = {fx:.2f} ± {fit.std[0]:.2f} px, fy = {fy:.2f} ± {fit.std[1]:.2f} px (1σ)"
+    action = "" if status == "PASS" else f"{TILT_MORE}, and come near"
+    return Verdict("σ of the focal length", 100 * relative, None, status, meaning, action, "%")
+
+
+def _projection(done: CalibratedCamera) -> list[Verdict]:
+    """How sure a projection is in the middle and where it is worst."""
+    std = done.uncertainty.map_px
+    worst, middle = float(np.nanmax(std)), float(std[std.shape[0] // 2, std.shape[1] // 2])
+    status = judged(worst, GOOD_PX, FAIR_PX)
+    place = done.worst_place
+    meaning = f"where the image is least known, {place}; {middle:.2g} px in the middle"
+    action = "" if status == "PASS" else f"put the board into the {place}"
+    return [Verdict("σ of a projection, worst", worst, None, status, meaning, action, "px")]
+
+
+def _tilt(done: CalibratedCamera) -> Verdict:
+    steepest = float(done.tilts.max())
+    status: Status = "PASS" if steepest >= STEEP else "WARN" if steepest >= FLAT else "FAIL"
+    meaning = f"the board is tilted by {np.degrees(done.tilts.min()):.0f} to {np.degrees(steepest):.0f}°"
+    action = "" if status == "PASS" else TILT_MORE
+    return Verdict("largest tilt", float(np.degrees(steepest)), None, status, meaning, action, "°")
+
+
+def _others(done: CalibratedCamera) -> list[Verdict]:
+    """What the detector and the solver say besides."""
+    fit = done.calibration
+    found = []
+    if any(audit.mirrored for audit in done.detections.audits):
+        names = [audit.name for audit in done.detections.audits if audit.mirrored]
+        meaning = f"{len(names)} pictures show the board mirrored ({', '.join(names[:3])} …)"
+        found.append(Verdict("mirrored pictures", len(names), None, "FAIL", meaning, "flip them back"))
+    for view in fit.outlier_views:
+        ratio = fit.view_rms[view] / float(np.median(fit.view_rms))
+        meaning = f"{fit.views[view].name} fits {ratio:.1f} times worse than the others and counts less"
+        action = "look at its corners, or leave it out"
+        found.append(Verdict("picture that does not fit", None, None, "WARN", meaning, action))
+    return found
+
+
+def judged(value: float, good: float, fair: float) -> Status:
+    """PASS up to good, WARN up to fair."""
+    return "PASS" if value <= good else "WARN" if value <= fair else "FAIL"

@@ -1,0 +1,125 @@
+"""`factorlab calibrate camera`: a lens from pictures of a board, and how sure it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from factorlab.cli.faults import in_one_sentence
+from factorlab.cli.settings import as_json, check_option, command_line, config_option
+
+if TYPE_CHECKING:
+    from factorlab.camera import CameraSettings
+
+__all__ = ["camera"]
+
+KINDS = ("checkerboard", "charuco", "circles", "acircles")
+LENSES = ("auto", "pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "thin12", "fisheye4")
+
+
+@click.command(short_help="Camera, from pictures of a checkerboard, ChArUco or circles.")
+@click.argument("sources", metavar="IMAGES…", nargs=-1, required=True)
+@click.option(
+    "--board",
+    "board_text",
+    metavar="COLSxROWS",
+    required=True,
+    help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles of a grid.",
+)
+@click.option(
+    "--square",
+    metavar="LENGTH",
+    required=True,
+    help="Side of a square, or distance of circles: 25mm, 2.5cm, 0.025m.",
+)
+@click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True, help="Board.")
+@click.option("--marker", metavar="LENGTH", help="Side of the markers of a ChArUco board: 18mm.")
+@click.option("--dictionary", metavar="NAME", help="Their dictionary: 4x4_50, 6x6_250 …")
+@click.option(
+    "--lens",
+    type=click.Choice(LENSES),
+    default="auto",
+    show_default=True,
+    help="Lens model; auto takes the one that predicts views best that it has not seen.",
+)
+@click.option(
+    "--window",
+    type=click.IntRange(1, 60),
+    metavar="N",
+    help="Half-width of the refinement window, px.  [default: from the squares, corner by corner]",
+)
+@click.option(
+    "--frames",
+    type=click.IntRange(3, 500),
+    default=40,
+    show_default=True,
+    metavar="N",
+    help="Pictures taken from a video: the sharpest of N equal stretches.",
+)
+@click.option(
+    "--all-corners", is_flag=True, help="Count every corner fully; the default weighs outliers down."
+)
+@as_json
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write the report, the camera in five formats, corners.csv and poses.csv here.",
+)
+@click.option("--force", is_flag=True, help="Write over an earlier report in DIR.")
+@check_option
+@config_option
+@in_one_sentence
+def camera(sources: tuple[str, ...], **options: Any) -> int:
+    """Intrinsics and distortion of a camera, with their uncertainty, from IMAGES of a board.
+
+    IMAGES are files, patterns, folders or videos.  Ten to twenty pictures do: the board tilted by 30 to 45°
+    this way and that, near enough to fill the image, in every corner of it once.
+
+    Corners are found and audited picture by picture; the lens model is the one that predicts left-out
+    pictures best; a map says how sure a projection is everywhere in the image.
+    """
+    from factorlab.camera import calibrate_pictures, camera_document, export_files
+    from factorlab.cli.delivery import deliver, require_output
+
+    require_output(options["out"], None, force=options["force"])
+    settings = _settings(options)
+    done = calibrate_pictures(sources, settings, say=lambda text: click.echo(text, err=True))
+    command = command_line()
+    return deliver(
+        camera_document(done, command),
+        as_json=options["as_json"],
+        out=options["out"],
+        force=options["force"],
+        check=options["check"],
+        files=export_files(done, command) if options["out"] is not None else None,
+    )
+
+
+def _settings(options: dict[str, Any]) -> CameraSettings:
+    """The board and the rest; what is wrong with the board's options is the command line's fault."""
+    from factorlab.camera import CameraSettings
+    from sequential.errors import FactorlabError
+    from vision3d.boards import board_from_text
+
+    if options["kind"] != "charuco":
+        for name in ("marker", "dictionary"):
+            if options[name] is not None:
+                raise click.UsageError(f"--{name} goes with --kind charuco")
+    try:
+        board = board_from_text(
+            options["board_text"], kind=options["kind"], square=options["square"],
+            marker=options["marker"], dictionary=options["dictionary"] or "4x4_50",
+        )  # fmt: skip
+    except FactorlabError as error:
+        raise click.BadParameter(str(error), param_hint="--board") from error
+    return CameraSettings(
+        board=board,
+        lens=options["lens"],
+        window=options["window"],
+        robust=not options["all_corners"],
+        frames=options["frames"],
+    )
