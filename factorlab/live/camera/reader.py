@@ -101,10 +101,10 @@ class FrameReader:
         with self.source as source:
             for frame in source:
                 if not source.live:
+                    start_ns = self._in_time(frame, start_ns)
                     if not self._going.is_set():
                         self._going.wait()
                         start_ns = 0
-                    start_ns = self._in_time(frame, start_ns)
                 if self._stop.is_set():
                     return
                 if self._going.is_set():

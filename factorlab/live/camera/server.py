@@ -244,7 +244,5 @@ def _json(value: Any) -> bytes:
 
 def _port_fault(port: int, fault: OSError) -> str:
     if fault.errno == errno.EADDRINUSE:
-        return (
-            f"port {port} of {HOST} is in use; close what uses it, or take another: --port 0 is any free one"
-        )
+        return f"port {port} of {HOST} is in use; close what uses it, or take any free one: --port 0"
     return f"port {port} of {HOST} cannot be used: {fault.strerror}; --port 0 takes any free one"

@@ -1,15 +1,6 @@
 """The page in a browser: the picture moves, numbers arrive, buttons work, the console is silent."""
 
 import pytest
-from chromium import Chromium
-
-
-@pytest.fixture
-def window(browser, tmp_path):
-    with Chromium(browser, tmp_path / "profile") as one:
-        yield one
-        assert one.console == []
-
 
 PIXELS = """(() => {
     const canvas = new OffscreenCanvas(picture.naturalWidth, picture.naturalHeight);
