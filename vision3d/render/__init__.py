@@ -1,6 +1,6 @@
 """Rendered truth: photographs of boards, markers and ground lines by a camera that is known exactly."""
 
-from vision3d.render.ground import GroundLine, RobotView, drive, random_line, render_ground
+from vision3d.render.ground import GroundLine, RobotView, drive, line_pixels, random_line, render_ground
 from vision3d.render.patterns import (
     board_planes,
     board_texture,
@@ -32,6 +32,7 @@ __all__ = [
     "circles_texture",
     "distance_field",
     "drive",
+    "line_pixels",
     "marker_corners",
     "marker_texture",
     "moving_board",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,11 +14,12 @@ from sequential.errors import ModelError, ShapeError
 from vision3d.lines.mount import CameraMount, planar_pose
 from vision3d.render.scene import Plane, render_planes
 from vision3d.render.texture import Texture, distance_field
+from vision3d.rigid import transform
 
 if TYPE_CHECKING:
     from vision3d.camera import Camera
 
-__all__ = ["GroundLine", "RobotView", "drive", "random_line", "render_ground"]
+__all__ = ["GroundLine", "RobotView", "drive", "line_pixels", "random_line", "render_ground"]
 
 Array = NDArray[np.float64]
 INK, FLOOR = 0.12, 0.7
@@ -88,6 +89,14 @@ class GroundLine:
         return float(left[nearest]), float(np.arctan2(forward[1], forward[0]))
 
     @cached_property
+    def edges(self) -> tuple[Array, Array]:
+        """Points (N, 2) along the left and along the right edge of the stripe, m."""
+        along = np.gradient(self.points, axis=0)
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        aside = 0.5 * self.width_m * np.column_stack([-along[:, 1], along[:, 0]])
+        return self.points + aside, self.points - aside
+
+    @cached_property
     def texture(self) -> Texture:
         """The stripe and a metre of ground round it."""
         from scipy.spatial import KDTree
@@ -126,6 +135,34 @@ def random_line(
     heading = np.cumsum(bend_per_m * waves * np.minimum(s / 0.3, 1.0)) * step
     points = np.cumsum(step * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
     return GroundLine(np.vstack([[-0.3, 0.0], [0.0, 0.0], points]), **looks)
+
+
+def line_pixels(
+    camera: Camera, mount: CameraMount, line: GroundLine, pose: Array, rows: Sequence[float]
+) -> Array:
+    """Where the middle between the stripe's edges crosses rows of the image: x (len(rows),) px, or NaN.
+
+    `pose` is the robot's (x, y, heading); of several crossings the nearest to the robot counts.
+    """
+    world = mount.world_pose(planar_pose(*pose))
+    sides = []
+    for edge in line.edges:
+        dense = np.arange(0.0, 1.0, 2e-4) * (len(edge) - 1)
+        fine = np.column_stack([np.interp(dense, np.arange(len(edge)), edge[:, k]) for k in (0, 1)])
+        pixels = camera.project(transform(world, np.column_stack([fine, np.zeros(len(fine))])))
+        sides.append([_crossing(pixels, row) for row in rows])
+    return np.mean(sides, axis=0)
+
+
+def _crossing(pixels: Array, row: float) -> float:
+    """The x at which a path of pixels first comes to a row from below."""
+    y = pixels[:, 1] - row
+    crossings = np.flatnonzero((y[:-1] > 0) & (y[1:] <= 0))
+    if not len(crossings):
+        return float("nan")
+    k = int(crossings[0])
+    share = y[k] / (y[k] - y[k + 1])
+    return float(pixels[k, 0] + share * (pixels[k + 1, 0] - pixels[k, 0]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -104,7 +104,7 @@ def render_planes(
         )
     radiance = radiance_of(camera, planes, supersample=supersample, background=background)
     if blur_px > 0:
-        radiance = cv2.GaussianBlur(radiance, (0, 0), blur_px)
+        radiance = np.asarray(cv2.GaussianBlur(radiance, (0, 0), blur_px), dtype=np.float32)
     normal = np.empty((0, 0), np.float32)
     if rng is not None and noise > 0:
         normal = rng.standard_normal(radiance.shape, dtype=np.float32)

@@ -150,11 +150,11 @@ def write_video(path: str | os.PathLike[str], images: Iterable[Image], fps: floa
     import cv2
 
     where = Path(path)
-    writer = None
+    writer, first = None, (0, 0)
     try:
         for k, image in enumerate(images):
             if writer is None:
-                first = image.shape[:2]
+                first = (image.shape[0], image.shape[1])
                 writer = cv2.VideoWriter(str(where), cv2.VideoWriter.fourcc(*"MJPG"), fps, first[::-1])
                 if not writer.isOpened():
                     raise DataError(
