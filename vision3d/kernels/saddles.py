@@ -22,7 +22,8 @@ from vision3d.kernels import inlined, kernel
 __all__ = ["fit_saddles"]
 
 P = 9
-ITERATIONS = 30
+ITERATIONS = 50
+SHARPEST, BLURRED = 0.45, 8.0  # px; below the first, pixels beside an edge say nothing of where it is
 ROOT2 = math.sqrt(2.0)
 
 
@@ -89,18 +90,19 @@ def _solve(L, g, x):
 
 
 @inlined
-def _inside(u, v, axes, half, reach):
-    """Whether an offset lies in the parallelogram of half-width `half` spacings, and in the circle."""
+def _inside(u, v, axes, half, inset, reach):
+    """Whether an offset lies in the parallelogram of half-width `half`, in its cross, and in the circle."""
     if u * u + v * v > reach * reach:
         return False
     det = axes[0, 0] * axes[1, 1] - axes[0, 1] * axes[1, 0]
     alpha = (u * axes[1, 1] - v * axes[1, 0]) / det
     beta = (v * axes[0, 0] - u * axes[0, 1]) / det
-    return abs(alpha) <= half and abs(beta) <= half
+    alpha, beta = abs(alpha), abs(beta)
+    return alpha <= half and beta <= half and min(alpha, beta) <= inset
 
 
 @inlined
-def _gather(image, cx, cy, axes, half, reach, px, py, value):
+def _gather(image, cx, cy, axes, half, inset, reach, px, py, value):
     """Pixels of the window around (cx, cy) that lie in the image; their number."""
     h, w = image.shape
     r = math.ceil(reach)
@@ -108,7 +110,7 @@ def _gather(image, cx, cy, axes, half, reach, px, py, value):
     n = 0
     for y in range(max(0, y0 - r), min(h, y0 + r + 1)):
         for x in range(max(0, x0 - r), min(w, x0 + r + 1)):
-            if _inside(x - cx, y - cy, axes, half, reach):
+            if _inside(x - cx, y - cy, axes, half, inset, reach):
                 px[n], py[n], value[n] = x, y, image[y, x]
                 n += 1
     return n
@@ -136,6 +138,18 @@ def _normal(q, b1, b2, n, px, py, value, row, A, g):
             g[i] += row[i] * r
             for j in range(i + 1):
                 A[i, j] += row[i] * row[j]
+
+
+@inlined
+def _hold(k, A, g):
+    """Keep a parameter where it is: at a bound it would drag the others along."""
+    for i in range(P):
+        if i > k:
+            A[i, k] = 0.0
+        else:
+            A[k, i] = 0.0
+    A[k, k] = 1.0
+    g[k] = 0.0
 
 
 @inlined
@@ -168,10 +182,11 @@ def _start(q, cx, cy, axes, n, px, py, value):
 @kernel(
     numba.void(
         numba.float32[:, ::1], numba.float64[:, ::1], numba.float64[:, :, ::1], numba.float64[:, ::1],
-        numba.float64, numba.float64, numba.float64[:, ::1], numba.float64[:, ::1], numba.float64[:, ::1],
+        numba.float64, numba.float64, numba.float64, numba.float64[:, ::1], numba.float64[:, ::1],
+        numba.float64[:, ::1],
     )
 )  # fmt: skip
-def fit_saddles(image, starts, axes, bends, half, reach, corners, covs, facts):
+def fit_saddles(image, starts, axes, bends, half, inset, reach, corners, covs, facts):
     """Fit a saddle at every start.
 
     Parameters
@@ -181,6 +196,8 @@ def fit_saddles(image, starts, axes, bends, half, reach, corners, covs, facts):
     axes : (N, 2, 2) the vectors in px from the corner to its neighbours along the board's x and y
     bends : (N, 2) 1/px curvature of the edges along x and along y, towards their normals
     half : half-width of the window in spacings
+    inset : how far from the nearer edge a pixel may be, in spacings: less than `half` leaves a cross, which
+        keeps what is printed inside the squares out
     reach : largest radius of the window in px
     corners : (N, 2) px out; NaN where the fit failed
     covs : (N, 3) px² out: xx, xy, yy for residuals of the size found
@@ -196,7 +213,7 @@ def fit_saddles(image, starts, axes, bends, half, reach, corners, covs, facts):
         facts[c, :] = np.nan
         cx, cy = starts[c, 0], starts[c, 1]
         b1, b2 = bends[c, 0], bends[c, 1]
-        n = _gather(image, cx, cy, axes[c], half, reach, px, py, value)
+        n = _gather(image, cx, cy, axes[c], half, inset, reach, px, py, value)
         facts[c, 3] = n
         if n < 2 * P:
             continue
@@ -205,6 +222,8 @@ def fit_saddles(image, starts, axes, bends, half, reach, corners, covs, facts):
         damping, alive, settled = 1e-3, True, False
         for _ in range(ITERATIONS):
             _normal(q, b1, b2, n, px, py, value, row, A, g)
+            if q[4] <= SHARPEST and g[4] < 0.0:
+                _hold(4, A, g)
             for i in range(P):
                 for j in range(i + 1):
                     D[i, j] = A[i, j]
@@ -215,14 +234,14 @@ def fit_saddles(image, starts, axes, bends, half, reach, corners, covs, facts):
             _solve(L, g, step)
             for i in range(P):
                 tried[i] = q[i] + step[i]
-            tried[4] = min(max(tried[4], 0.25), 8.0)
+            tried[4] = min(max(tried[4], SHARPEST), BLURRED)
             new = _cost(tried, b1, b2, n, px, py, value, row)
             if new <= cost:
                 for i in range(P):
                     q[i] = tried[i]
                 gain = cost - new
                 cost = new
-                damping = max(damping * 0.2, 1e-9)
+                damping = max(damping * 0.2, 1e-6)
                 if gain <= 1e-7 * cost + 1e-9 and abs(step[0]) + abs(step[1]) < 1e-3:
                     settled = True
                     break
@@ -237,6 +256,8 @@ def fit_saddles(image, starts, axes, bends, half, reach, corners, covs, facts):
         if not (alive and settled):
             continue
         _normal(q, b1, b2, n, px, py, value, row, A, g)
+        if q[4] <= SHARPEST:
+            _hold(4, A, g)
         if not _factor(A, L):
             continue
         variance = cost / (n - P)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vision3d.boards import Board
-from vision3d.calibrate.detection.checkerboards import Found
+from vision3d.boards import Board, MarkerBoard
+from vision3d.calibrate.detection.found import Found
 from vision3d.calibrate.detection.lattice import Array, spacing_px
 from vision3d.calibrate.detection.refine import allowed_px
 from vision3d.calibrate.detection.smooth import fit_smooth
@@ -98,8 +98,11 @@ def _findings(board: Board, audit: ViewAudit) -> tuple[str, ...]:
 
 
 def _corners(board: Board, ids: list[int] | tuple[int, ...]) -> str:
-    """Name points by column and row: `corner (3, 0)`, `4 corners (0, 0), (1, 0), …`."""
-    columns = max(board.shape[0], 1)
-    named = ", ".join(f"({i % columns}, {i // columns})" for i in ids[:4])
+    """Name points by column and row, or by marker: `corner (3, 0)`, `2 corners 0 of marker 7, …`."""
+    columns = board.shape[0]
+    if isinstance(board, MarkerBoard):
+        named = ", ".join(f"{i % 4} of marker {board.ids[i // 4]}" for i in ids[:4])
+    else:
+        named = ", ".join(f"({i % columns}, {i // columns})" for i in ids[:4])
     more = ", …" if len(ids) > 4 else ""
     return f"corner {named}" if len(ids) == 1 else f"{len(ids)} corners {named}{more}"

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from vision3d.boards import Checkerboard
+from vision3d.calibrate.detection.found import Found, NotFound
 from vision3d.calibrate.detection.grid_growth import Grid, find_grids
-from vision3d.calibrate.detection.lattice import Array, Ids
+from vision3d.calibrate.detection.lattice import Array
 from vision3d.calibrate.detection.ordering import Cells, dark_first, laid_out, parity_sign, turned_towards
-from vision3d.calibrate.detection.refine import Refined, refine_saddles
+from vision3d.calibrate.detection.refine import refine_saddles
 
-__all__ = ["Found", "NotFound", "find_checkerboard"]
+__all__ = ["find_checkerboard"]
 
 Grey = NDArray[np.uint8]
 
@@ -21,27 +20,6 @@ AGREED = 0.8
 """Mean agreement of the corners about the colour of the squares, below which a grid is no checkerboard."""
 WIDE_PX = 1200
 FILLED = 0.6
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """Refined points of a board: ids (N,) in order, `refined` row by row, and what found them."""
-
-    ids: Ids
-    refined: Refined
-    finder: str
-    lost: tuple[int, ...] = ()
-    dark_first: bool = True
-    mirrored: bool = False
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class NotFound:
-    """What was seen instead of the board: columns and rows of a grid, or None."""
-
-    seen: tuple[int, int] | None = None
-    reason: str = ""
 
 
 def find_checkerboard(grey: Grey, board: Checkerboard) -> Found | NotFound:
@@ -145,10 +123,7 @@ def _settled(grey: Grey, way: Cells, board: Checkerboard, finder: str) -> Found 
     kept = order[good[order]]
     return Found(
         ids=ids[kept],
-        refined=Refined(
-            refined.pixels[kept], refined.sigma_px[kept], refined.contrast[kept], refined.blur_px[kept],
-            refined.reach_px[kept],
-        ),
+        refined=refined.rows(kept),
         finder=finder,
         lost=tuple(int(i) for i in np.sort(ids[~good])),
         dark_first=dark,

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError, ShapeError
-from vision3d.boards import Board, Checkerboard
+from vision3d.boards import Board, CharucoBoard, Checkerboard, MarkerBoard
 from vision3d.calibrate.detection.audit import audited
-from vision3d.calibrate.detection.checkerboards import Found, NotFound, find_checkerboard
+from vision3d.calibrate.detection.charuco import find_charuco, find_marker_board
+from vision3d.calibrate.detection.checkerboards import find_checkerboard
+from vision3d.calibrate.detection.found import Found, NotFound
 from vision3d.views import Detections, Missed, View, ViewAudit
 
 __all__ = ["detect_view", "detect_views", "grey_of"]
@@ -100,14 +102,18 @@ def grey_of(image: Image, name: str = "image") -> NDArray[np.uint8]:
         array = (
             np.asarray(cv2.cvtColor(array, codes[array.shape[2]])) if array.shape[2] > 1 else array[..., 0]
         )
-    grey: NDArray[np.uint8] = np.ascontiguousarray(array)
+    grey: NDArray[np.uint8] = np.require(array, np.uint8, ["C", "W"])
     return grey
 
 
 def _find(grey: NDArray[np.uint8], board: Board) -> Found | NotFound:
     if isinstance(board, Checkerboard):
         return find_checkerboard(grey, board)
-    raise ModelError(f"a {board.kind} board cannot be looked for here; expected a checkerboard")
+    if isinstance(board, CharucoBoard):
+        return find_charuco(grey, board)
+    if isinstance(board, MarkerBoard):
+        return find_marker_board(grey, board)
+    raise ModelError(f"a {board.kind} board cannot be looked for here")
 
 
 def _each(

@@ -41,13 +41,22 @@ class Refined:
     blur_px: Array
     reach_px: Array
 
+    def rows(self, keep: NDArray[np.int64] | NDArray[np.bool_]) -> Refined:
+        """Some of the points: indices, or a mask (N,)."""
+        return Refined(
+            self.pixels[keep], self.sigma_px[keep], self.contrast[keep], self.blur_px[keep],
+            self.reach_px[keep],
+        )  # fmt: skip
+
 
 def allowed_px(pixels: Array) -> Array:
     """Half-width of the largest window around each point that keeps its neighbours out, (N,) px."""
     return HALF * spacing_px(pixels)
 
 
-def refine_saddles(grey: NDArray[np.uint8], pixels: Array, ids: Ids, shape: tuple[int, int]) -> Refined:
+def refine_saddles(
+    grey: NDArray[np.uint8], pixels: Array, ids: Ids, shape: tuple[int, int], inset: float = 1.0
+) -> Refined:
     """Fit a blurred saddle at every corner, twice: the first fit says how wide the second may look.
 
     Parameters
@@ -56,6 +65,7 @@ def refine_saddles(grey: NDArray[np.uint8], pixels: Array, ids: Ids, shape: tupl
     pixels : (N, 2) starts, good to a quarter of the spacing
     ids : (N,) their numbers on the lattice
     shape : (columns, rows) of the lattice
+    inset : how far from the nearer edge of a square pixels are looked at, in spacings
     """
     from vision3d.kernels.saddles import fit_saddles
 
@@ -64,14 +74,14 @@ def refine_saddles(grey: NDArray[np.uint8], pixels: Array, ids: Ids, shape: tupl
     n = len(start)
     corners, covs, facts = np.empty((n, 2)), np.empty((n, 3)), np.empty((n, 5))
     axes, bends = lattice_axes(start, ids, shape), edge_bends(start, ids, shape)
-    fit_saddles(image, start, axes, bends, HALF, REACH_PX, corners, covs, facts)
+    fit_saddles(image, start, axes, bends, HALF, inset, REACH_PX, corners, covs, facts)
     good = _believable(start, corners, facts, axes)
     reach = REACH_PX
     if good.any():
         start = np.where(good[:, None], corners, start)
         reach = max(REACH_PX, REACH_PX / SHARP_PX * float(np.median(facts[good, 2])))
         axes, bends = lattice_axes(start, ids, shape), edge_bends(start, ids, shape)
-        fit_saddles(image, start, axes, bends, HALF, reach, corners, covs, facts)
+        fit_saddles(image, start, axes, bends, HALF, inset, reach, corners, covs, facts)
         good = _believable(np.asarray(pixels, dtype=np.float64), corners, facts, axes)
     sigma = np.sqrt(INFLATION**2 * 0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2)
     lost = ~good
