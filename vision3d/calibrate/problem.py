@@ -55,6 +55,15 @@ class Problem:
             views[0].size,
         )
 
+    @classmethod
+    def of_points(
+        cls, points: Array, sigma_px: float, starts: NDArray[np.int64], size: tuple[int, int]
+    ) -> Problem:
+        """Points that nobody has seen yet, for what they would tell."""
+        n = len(points)
+        nowhere = np.zeros((n, 2))
+        return cls(points, nowhere, np.full(n, sigma_px), _bend(points), starts.astype(np.int64), size)
+
     @property
     def count(self) -> int:
         """How many views there are."""
