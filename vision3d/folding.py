@@ -21,6 +21,12 @@ __all__ = ["Fold", "check_monotonic", "radial_limit"]
 
 IMAGINARY_MAX = 1e-9
 """Imaginary part, relative, of a root that is taken for real."""
+BEFORE_POLE = 1.0 - 1e-9
+"""Where the valid field ends before a pole, as a share of its squared radius."""
+UNBOUNDED = 1e5
+"""An image radius, in focal lengths, that only a pole gives."""
+AT_POLE = 0.98
+"""Share of a pole's radius beyond which rays belong to the pole rather than to the lens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +35,11 @@ class Fold:
 
     Parameters
     ----------
-    radius_px : distance from the principal point at which the radial part folds, px; inf where nowhere
-    angle_rad : angle of that ray from the optical axis, rad; inf where there is none
-    inside : whether some pixel of the image has no ray
-    lost : share of the image's pixels without a ray, 0 to 1
+    radius_px : distance from the principal point at which the radial part folds, px; inf where nowhere, or
+        at a pole, up to which the image grows without bound
+    angle_rad : angle from the optical axis beyond which rays have no image, rad; inf where there is none
+    inside : whether some pixel of the image has no ray, or one that only a pole gives it
+    lost : share of such pixels in the image, 0 to 1
     """
 
     radius_px: float
@@ -41,16 +48,20 @@ class Fold:
     lost: float
 
     def __str__(self) -> str:
-        if not np.isfinite(self.radius_px):
+        end = f"{np.degrees(self.angle_rad):.1f}° off axis"
+        if np.isfinite(self.radius_px):
+            what = f"the distortion folds {self.radius_px:.0f} px from the principal point ({end})"
+        elif np.isfinite(self.angle_rad):
+            what = f"the distortion has a pole {end}, beyond which nothing has an image"
+        elif self.inside:
+            what = "the tangential or thin-prism terms of the distortion fold the image"
+        else:
             return "the distortion is one-to-one everywhere"
-        where = (
-            f"{self.radius_px:.0f} px from the principal point ({np.degrees(self.angle_rad):.1f}° off axis)"
-        )
         if not self.inside:
-            return f"the distortion folds {where}, outside the image"
+            return f"{what}, outside the image" if np.isfinite(self.radius_px) else what
         return (
-            f"the distortion folds {where}, inside the image: {100.0 * self.lost:.1f} % of pixels have no "
-            "ray; calibrate with corners in the corners of the image, or with fewer coefficients"
+            f"{what}, inside the image: {100.0 * self.lost:.1f} % of its pixels have no ray; calibrate "
+            "with corners near the corners of the image, or with fewer coefficients"
         )
 
 
@@ -71,7 +82,8 @@ def radial_limit(lens: str, parameters: Array) -> float:
     s = Polynomial([0.0, 1.0])
     # d(r g)/dr = (N D + 2 s (N' D - N D')) / D², with s = r² and g = N / D
     slope = top * under + 2.0 * s * (top.deriv() * under - top * under.deriv())
-    return float(np.sqrt(min(_first_sign_change(slope), _first_sign_change(under))))
+    pole = _first_sign_change(under) * BEFORE_POLE
+    return float(np.sqrt(min(_first_sign_change(slope), pole)))
 
 
 def check_monotonic(camera: Camera, *, samples: int = 48) -> Fold:
@@ -87,14 +99,18 @@ def check_monotonic(camera: Camera, *, samples: int = 48) -> Fold:
         np.linspace(-0.5, width - 0.5, samples), np.linspace(-0.5, height - 0.5, samples)
     )
     rays = camera.unproject(np.stack([across.ravel(), down.ravel()], axis=-1))
-    lost = float(np.isnan(rays[:, 0]).mean())
     limit = camera.limit
     is_fisheye = camera.lens == "fisheye4"
+    # up to a pole the image grows without bound, so that every pixel finds a ray, crowded in front of it
+    crowd = AT_POLE * limit if _image_radius(camera, min(limit, UNBOUNDED)) > UNBOUNDED else np.inf
+    good = np.hypot(rays[:, 0], rays[:, 1]) < crowd * np.abs(rays[:, 2])
+    lost = float(1.0 - good.mean())
     if not np.isfinite(limit) or (is_fisheye and limit >= np.pi):
         return Fold(np.inf, np.inf, lost > 0.0, lost)
     focal = float(np.sqrt(camera.intrinsics[0] * camera.intrinsics[1]))
     angle = limit if is_fisheye else float(np.arctan(limit))
-    return Fold(focal * _image_radius(camera, limit), angle, lost > 0.0, lost)
+    radius = _image_radius(camera, limit)
+    return Fold(focal * radius if radius < UNBOUNDED else np.inf, angle, lost > 0.0, lost)
 
 
 def _image_radius(camera: Camera, t: float) -> float:
@@ -105,7 +121,7 @@ def _image_radius(camera: Camera, t: float) -> float:
         return float(t * (1.0 + s * (k["k1"] + s * (k["k2"] + s * (k["k3"] + s * k["k4"])))))
     top = 1.0 + s * (k.get("k1", 0.0) + s * (k.get("k2", 0.0) + s * k.get("k3", 0.0)))
     under = 1.0 + s * (k.get("k4", 0.0) + s * (k.get("k5", 0.0) + s * k.get("k6", 0.0)))
-    return float(t * top / under) if under != 0.0 else float("inf")
+    return float(t * top / under)
 
 
 def _names(lens: str) -> tuple[str, ...]:
