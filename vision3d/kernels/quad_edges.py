@@ -38,7 +38,7 @@ def grey(image, x, y):
     return (1.0 - b) * top + b * bottom
 
 
-@kernel("float64(uint8[:,::1], float64, float64, float64, float64, float64, float64[::1])")
+@kernel("f8(u1[:,::1], f8, f8, f8, f8, f8, f8[::1])")
 def edge_offset(image, x, y, nx, ny, half, profile):
     """Where the edge lies along the normal from (x, y), px outward; NaN where there is none."""
     count = round(2.0 * half / STEPS_PX) + 1
@@ -88,7 +88,7 @@ def solved(H, g, order, found, cov):
     return True
 
 
-@kernel("int64(float64[::1], float64[::1], int64, float64, float64[::1], float64[:,::1])")
+@kernel("i8(f8[::1], f8[::1], i8, f8, f8[::1], f8[:,::1])")
 def fit_curve(places, offsets, count, length, found, cov):
     """Fit offset = a + b u + c u² robustly, u = place / length - 1/2; c only where the side is clearly bent.
 
@@ -168,7 +168,7 @@ def meet(quad, found, k, corners, D):
     return True
 
 
-@kernel("boolean(uint8[:,::1], float64[:,::1], float64, float64, float64, float64[:,::1], float64[:,::1])")
+@kernel("b1(u1[:,::1], f8[:,::1], f8, f8, f8, f8[:,::1], f8[:,::1])")
 def refine_quad(image, quad, half, floor_px, correlation, corners, cov):
     """One round: lines through the four sides of `quad`, their meeting points and their covariance."""
     places, offsets, profile = np.empty(MOST), np.empty(MOST), np.empty(64)
@@ -218,15 +218,12 @@ def refine_quad(image, quad, half, floor_px, correlation, corners, cov):
     return True
 
 
-@kernel(
-    "void(uint8[:,::1], float64[:,:,::1], int64, float64, float64, float64,"
-    "float64[:,:,::1], float64[:,:,::1], boolean[::1])"
-)
+@kernel("void(u1[:,::1], f8[:,:,::1], i8, f8, f8, f8, f8[:,:,::1], f8[:,:,::1], b1[::1])")
 def refine_quads(image, quads, cells, floor_px, correlation, reach_px, corners, covs, refined):
     """Refine quadrilaterals (M, 4, 2) of `cells` cells a side, borders included; two rounds each.
 
-    `corners` (M, 4, 2) and `covs` (M, 8, 8) are filled where `refined` (M,) becomes True.  A corner that would
-    move further than `reach_px` (or a third of a cell, if that is more) leaves its quadrilateral as it was.
+    `corners` (M, 4, 2) and `covs` (M, 8, 8) are filled where `refined` (M,) becomes True.  A corner that
+    would move further than `reach_px` (or a third of a cell, if that is more) leaves its quadrilateral alone.
     Where the white around a marker is too narrow for long profiles, short ones are tried.
     """
     start = np.empty((4, 2))

@@ -1,4 +1,4 @@
-"""Square markers in one picture: their numbers, their corners to a hundredth of a pixel, and how sure those are.
+"""Square markers in one picture: their numbers, their corners, and how sure those are.
 
 OpenCV finds candidate squares and reads their cells; the corners are ours: lines fitted to the four sides,
 whose scatter says what each corner is worth (`vision3d.kernels.quad_edges`).
@@ -64,10 +64,16 @@ class Marker:
         if corners.shape != (4, 2):
             raise ShapeError(f"marker {self.id}: corners are (4, 2), got {corners.shape}")
         sigma = np.array(np.broadcast_to(np.asarray(self.sigma_px, dtype=np.float64), (4,)))
-        cov = np.diag(np.repeat(sigma**2, 2)) if self.cov_px2 is None else np.array(self.cov_px2, dtype=float)
+        cov = None if self.cov_px2 is None else np.array(self.cov_px2, dtype=np.float64)
         for name, array in (("corners", corners), ("sigma_px", sigma), ("cov_px2", cov)):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            if array is not None:
+                array.flags.writeable = False
+                object.__setattr__(self, name, array)
+
+    @property
+    def cov(self) -> Array:
+        """The covariance (8, 8) of x0 y0 x1 y1 …, px²; diagonal where none was given."""
+        return np.diag(np.repeat(self.sigma_px**2, 2)) if self.cov_px2 is None else self.cov_px2
 
     @property
     def centre(self) -> Array:
@@ -109,7 +115,7 @@ def find_markers(image: NDArray[np.uint8], dictionary: str = "auto") -> tuple[tu
         return _refined(grey, *_squares(grey, name), name), name
     best: tuple[float, str | None] = (0.0, None)
     for family, longest in FAMILIES.items():
-        quads, ids = _squares(grey, longest)
+        ids = _squares(grey, longest)[1]
         score = len(ids) * surprise(longest)
         if score > best[0]:
             best = (score, smallest_of(family, int(ids.max())))
@@ -134,8 +140,7 @@ def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     if image.shape[2] == 1:
         return np.ascontiguousarray(image[..., 0])
     code = cv2.COLOR_BGR2GRAY if image.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
-    grey: NDArray[np.uint8] = cv2.cvtColor(image, code)
-    return grey
+    return np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)
 
 
 @cache
