@@ -1,10 +1,9 @@
 """Corners of dark quadrilaterals on white, from lines fitted to their four sides.
 
-Along each side the edge is found every pixel, from the area under the profile of grey levels across it:
-between a dark level d and a bright level b, the edge lies where a sharp step of the same area would.  A blur
-that is symmetric moves that place nowhere, noise is averaged over hundreds of pixels, and the scatter about
-the fitted line says what the line is worth.  A corner is where two lines meet; since neighbouring corners
-share a line, the covariance is one matrix for all four, (8, 8), order x0 y0 x1 y1 …
+Along each side the edge is found every pixel, as the centre of the slope of the grey levels across it.  A
+blur that is symmetric moves that place nowhere, noise is averaged over hundreds of pixels, and the scatter
+about the fitted line says what the line is worth.  A corner is where two lines meet; since neighbours
+share a line, the covariance is one matrix for all four corners, (8, 8), order x0 y0 x1 y1 …
 
 Image rows are y, columns are x, the centre of the first pixel is (0, 0).  Corners run clockwise as seen in
 the image (y down), so that the outward normal of a side of direction (dx, dy) is (dy, -dx).
@@ -21,7 +20,10 @@ from vision3d.kernels import inlined, kernel
 __all__ = ["refine_quads"]
 
 STEPS_PX = 0.5  # between samples of a profile
-SHORTEST_PX, LONGEST_PX = 2.0, 4.0  # half of a profile
+SHORTEST_PX, USUAL_PX, LONGEST_PX = 1.25, 2.0, 7.0  # half of a profile
+SHORTEST_SIDE_PX = 6.0
+LEAST_CONTRAST = 12.0
+ROUNDS = 8
 MOST = 400  # places along a side
 
 
@@ -38,105 +40,101 @@ def grey(image, x, y):
     return (1.0 - b) * top + b * bottom
 
 
-@kernel("f8(u1[:,::1], f8, f8, f8, f8, f8, f8[::1])")
-def edge_offset(image, x, y, nx, ny, half, profile):
-    """Where the edge lies along the normal from (x, y), px outward; NaN where there is none."""
-    count = round(2.0 * half / STEPS_PX) + 1
+@kernel("f8(u1[:,::1], f8, f8, f8, f8, f8, f8[::1], f8[::1])")
+def edge_offset(image, x, y, nx, ny, half, profile, response):
+    """Where the edge lies along the normal from (x, y), px outward; NaN where there is none.
+
+    It is the centre of the slope within +- `half`.  A window shorter than the slope moves less than the edge
+    does: response[0] becomes by what share, response[1] the contrast.
+    """
+    count = round(4.0 * half) + 1
+    step = 2.0 * half / (count - 1)
     for k in range(count):
-        s = -half + k * STEPS_PX
+        s = -half + k * step
         g = grey(image, x + s * nx, y + s * ny)
         if g < 0.0:
             return math.nan
         profile[k] = g
-    dark = (profile[0] + profile[1]) / 2.0
-    bright = (profile[count - 1] + profile[count - 2]) / 2.0
-    contrast = bright - dark
-    if contrast < 12.0:
+    contrast = profile[count - 1] - profile[0]
+    if contrast < LEAST_CONTRAST:
         return math.nan
-    area = 0.0
+    area = -0.5 * contrast
     for k in range(count):
-        weight = 0.5 if k in (0, count - 1) else 1.0
-        area += weight * (profile[k] - dark)
-    offset = half - area * STEPS_PX / contrast
-    if abs(offset) > half - 0.5:
-        return math.nan
-    return offset
+        area += profile[k] - profile[0]
+    ends = profile[1] - profile[0] + profile[count - 1] - profile[count - 2]
+    response[0] = 1.0 - half * ends / (step * contrast)
+    response[1] = contrast
+    return half - area * step / contrast
 
 
 @inlined
-def solved(H, g, order, found, cov):
-    """Solve the first `order` of three normal equations; the rest of `found` and `cov` is zero."""
-    cov[:] = 0.0
-    det = H[0, 0] * H[1, 1] - H[0, 1] * H[0, 1]
-    if not det > 1e-9 * H[0, 0] * H[0, 0]:
+def solved(H, g, found, cov):
+    """Solve three normal equations; False where they are singular."""
+    a, b, c, d, e, f = H[0, 0], H[0, 1], H[0, 2], H[1, 1], H[1, 2], H[2, 2]
+    whole = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
+    if not whole > 1e-12 * a * a * a:
         return False
-    if order == 2:
-        cov[0, 0], cov[1, 1] = H[1, 1] / det, H[0, 0] / det
-        cov[0, 1] = cov[1, 0] = -H[0, 1] / det
-        found[2] = 0.0
-    else:
-        a, b, c, d, e, f = H[0, 0], H[0, 1], H[0, 2], H[1, 1], H[1, 2], H[2, 2]
-        whole = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
-        if not whole > 1e-12 * a * a * a:
-            return False
-        cov[0, 0], cov[1, 1], cov[2, 2] = (d * f - e * e) / whole, (a * f - c * c) / whole, det / whole
-        cov[0, 1] = cov[1, 0] = (c * e - b * f) / whole
-        cov[0, 2] = cov[2, 0] = (b * e - c * d) / whole
-        cov[1, 2] = cov[2, 1] = (b * c - a * e) / whole
-    for i in range(order):
-        found[i] = cov[i, 0] * g[0] + cov[i, 1] * g[1] + (cov[i, 2] * g[2] if order == 3 else 0.0)
+    cov[0, 0], cov[1, 1], cov[2, 2] = (
+        (d * f - e * e) / whole,
+        (a * f - c * c) / whole,
+        (a * d - b * b) / whole,
+    )
+    cov[0, 1] = cov[1, 0] = (c * e - b * f) / whole
+    cov[0, 2] = cov[2, 0] = (b * e - c * d) / whole
+    cov[1, 2] = cov[2, 1] = (b * c - a * e) / whole
+    for i in range(3):
+        found[i] = cov[i, 0] * g[0] + cov[i, 1] * g[1] + cov[i, 2] * g[2]
     return True
 
 
-@kernel("i8(f8[::1], f8[::1], i8, f8, f8[::1], f8[:,::1])")
-def fit_curve(places, offsets, count, length, found, cov):
-    """Fit offset = a + b u + c u² robustly, u = place / length - 1/2; c only where the side is clearly bent.
+@kernel("i8(f8[::1], f8[::1], i8, f8, f8, f8, f8[::1], f8[:,::1])")
+def fit_curve(places, offsets, count, length, bend, bend_sigma, found, cov):
+    """Fit offset = a + b u + c u² robustly, u = place / length - 1/2.
 
-    `found` (4,) receives a, b, c and the scatter; `cov` (3, 3) their covariance.  Returns the points kept.
+    A lens bends straight sides: c is `bend` within `bend_sigma` before anything is seen.  `found` (4,)
+    receives a, b, c and the scatter; `cov` (3, 3) their covariance.  Returns the points kept, 0 if too few.
     """
     H, g = np.zeros((3, 3)), np.zeros(3)
-    scatter, used, order = 1.0, count, 2
-    found[:] = 0.0
-    for rounds in range(6):
-        if rounds == 3 and count >= 24:
-            order = 3
-        H[:] = 0.0
-        g[:] = 0.0
+    scatter, used = 0.5, count
+    found[0], found[1], found[2] = 0.0, 0.0, bend
+    for turn in range(6):
+        for i in range(3):
+            g[i] = 0.0
+            for j in range(3):
+                H[i, j] = 0.0
         used = 0
         for k in range(count):
             u = places[k] / length - 0.5
-            r = offsets[k] - found[0] - found[1] * u - found[2] * u * u
+            r = abs(offsets[k] - found[0] - found[1] * u - found[2] * u * u)
             weight = 1.0
-            if rounds > 0 and abs(r) > 2.0 * scatter:
-                weight = 2.0 * scatter / abs(r)
-                if abs(r) > 6.0 * scatter:
+            if turn > 0 and r > 2.0 * scatter:
+                weight = 2.0 * scatter / r
+                if r > 6.0 * scatter:
                     continue
             used += 1
             H[0, 0] += weight
             H[0, 1] += weight * u
             H[1, 1] += weight * u * u
-            H[0, 2] += weight * u * u
             H[1, 2] += weight * u * u * u
             H[2, 2] += weight * u * u * u * u
             g[0] += weight * offsets[k]
             g[1] += weight * offsets[k] * u
             g[2] += weight * offsets[k] * u * u
-        if used < max(4, count // 3) or not solved(H, g, order, found, cov):
+        H[1, 0], H[0, 2], H[2, 0], H[2, 1] = H[0, 1], H[1, 1], H[1, 1], H[1, 2]
+        ratio = scatter * scatter / (bend_sigma * bend_sigma)
+        H[2, 2] += ratio
+        g[2] += ratio * bend
+        if used < max(4, count // 2) or not solved(H, g, found, cov):
             return 0
         squares, kept = 0.0, 0
         for k in range(count):
             u = places[k] / length - 0.5
             r = abs(offsets[k] - found[0] - found[1] * u - found[2] * u * u)
-            if rounds == 0 or r <= 6.0 * scatter:
-                r = min(r, 2.5 * scatter) if rounds > 0 else r
+            if turn == 0 or r <= 6.0 * scatter:
+                r = min(r, 2.5 * scatter) if turn > 0 else r
                 squares += r * r
                 kept += 1
-        scatter = max(math.sqrt(squares / max(1, kept - order)), 0.01)
-        if rounds == 5 and order == 3 and abs(found[2]) < 4.0 * scatter * math.sqrt(2.0 * cov[2, 2]):
-            order = 2
-            found[2] = 0.0
-            if not solved(H, g, 2, found, cov):
-                return 0
+        scatter = max(math.sqrt(squares / max(1, kept - 2)), 0.01)
     found[3] = scatter
     for i in range(3):
         for j in range(3):
@@ -168,43 +166,63 @@ def meet(quad, found, k, corners, D):
     return True
 
 
-@kernel("b1(u1[:,::1], f8[:,::1], f8, f8, f8, f8[:,::1], f8[:,::1])")
-def refine_quad(image, quad, half, floor_px, correlation, corners, cov):
+@kernel("f8(u1[:,::1], f8, f8, f8, f8, f8, f8, f8, f8[::1], f8[:,::1])")
+def side_line(image, x, y, dx, dy, half, bend, bend_sigma, found, cov):
+    """Fit the edge from (x, y) to (x + dx, y + dy), offsets outward; returns its response, 0 if none."""
+    places, offsets, contrasts = np.empty(MOST), np.empty(MOST), np.empty(MOST)
+    profile, response = np.empty(64), np.empty(2)
+    length = math.hypot(dx, dy)
+    dx, dy = dx / length, dy / length
+    margin = min(max(1.2 * half + 0.7, 0.06 * length), 0.28 * length)
+    step = max(1.0, (length - 2.0 * margin) / (MOST - 1))
+    count, tried, responses, most, u = 0, 0, 0.0, 0.0, margin
+    while u <= length - margin and tried < MOST:
+        s = edge_offset(image, x + u * dx, y + u * dy, dy, -dx, half, profile, response)
+        if not math.isnan(s):
+            places[count], offsets[count], contrasts[count] = u, s, response[1]
+            most = max(most, response[1])
+            responses += response[0]
+            count += 1
+        tried += 1
+        u += step
+    total, count = count, 0
+    for k in range(total):  # where the profile is not of dark on white alone, its contrast is low
+        if contrasts[k] > 0.5 * most:
+            places[count], offsets[count] = places[k], offsets[k]
+            count += 1
+    if count < max(4, int(0.6 * tried)):
+        return 0.0
+    share = min(max(responses / total, 0.3), 1.0)
+    for k in range(count):
+        offsets[k] = min(max(offsets[k] / share, -1.2 * half), 1.2 * half)
+    return share if fit_curve(places, offsets, count, length, bend, bend_sigma, found, cov) else 0.0
+
+
+@kernel("b1(u1[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])")
+def refine_quad(image, quad, halves, bends, floors, responses, noise, corners, cov):
     """One round: lines through the four sides of `quad`, their meeting points and their covariance."""
-    places, offsets, profile = np.empty(MOST), np.empty(MOST), np.empty(64)
     found, line_cov = np.zeros((4, 4)), np.zeros((4, 3, 3))
     for k in range(4):
         x, y = quad[k, 0], quad[k, 1]
         dx, dy = quad[(k + 1) % 4, 0] - x, quad[(k + 1) % 4, 1] - y
-        length = math.hypot(dx, dy)
-        if not length > 8.0:
+        if not math.hypot(dx, dy) > SHORTEST_SIDE_PX:
             return False
-        dx, dy = dx / length, dy / length
-        margin = min(max(2.5, 0.06 * length), 0.25 * length)
-        step = max(1.0, (length - 2.0 * margin) / (MOST - 1))
-        count, u = 0, margin
-        while u <= length - margin and count < MOST:
-            s = edge_offset(image, x + u * dx, y + u * dy, dy, -dx, half, profile)
-            if not math.isnan(s):
-                places[count], offsets[count] = u, s
-                count += 1
-            u += step
-        if count < 5 or count * step < 0.4 * (length - 2.0 * margin):
-            return False
-        if fit_curve(places, offsets, count, length, found[k], line_cov[k]) == 0:
+        unsure = max(0.02, noise[2] * (dx * dx + dy * dy))
+        responses[k] = side_line(image, x, y, dx, dy, halves[k], bends[k], unsure, found[k], line_cov[k])
+        if responses[k] == 0.0:
             return False
     D = np.zeros((8, 8))  # of a corner by the offset of each line at it: columns (line, begin or end)
     ends = np.zeros((8, 8))
+    at = np.array([[1.0, -0.5, 0.25], [1.0, 0.5, 0.25]])
     for k in range(4):
-        at = np.array([[1.0, -0.5, 0.25], [1.0, 0.5, 0.25]])
         for i in range(2):
             for j in range(2):
                 s = 0.0
                 for p in range(3):
                     for q in range(3):
-                        s += at[i, p] * correlation * line_cov[k, p, q] * at[j, q]
+                        s += at[i, p] * noise[1] * line_cov[k, p, q] * at[j, q]
                 ends[2 * k + i, 2 * k + j] = s
-            ends[2 * k + i, 2 * k + i] += floor_px * floor_px
+            ends[2 * k + i, 2 * k + i] += floors[k] * floors[k]
     for k in range(4):
         if not meet(quad, found, k, corners, D):
             return False
@@ -218,43 +236,54 @@ def refine_quad(image, quad, half, floor_px, correlation, corners, cov):
     return True
 
 
-@kernel("void(u1[:,::1], f8[:,:,::1], i8, f8, f8, f8, f8[:,:,::1], f8[:,:,::1], b1[::1])")
-def refine_quads(image, quads, cells, floor_px, correlation, reach_px, corners, covs, refined):
-    """Refine quadrilaterals (M, 4, 2) of `cells` cells a side, borders included; two rounds each.
+@kernel("void(u1[:,::1], f8[:,:,::1], f8[:,::1], i8, f8[::1], f8, f8[:,:,::1], f8[:,:,::1], b1[::1])")
+def refine_quads(image, quads, bends, cells, noise, reach_px, corners, covs, refined):
+    """Refine quadrilaterals (M, 4, 2) of `cells` cells a side, borders included.
 
+    `bends` (M, 4) is by how much each side is bent, as offset / u² with u from -1/2 to 1/2 along it.  `noise`
+    is: px that no line is better than; factor of a line's variance, for profiles that share pixels; sigma of
+    the bend over the square of the side's length.
     `corners` (M, 4, 2) and `covs` (M, 8, 8) are filled where `refined` (M,) becomes True.  A corner that
     would move further than `reach_px` (or a third of a cell, if that is more) leaves its quadrilateral alone.
-    Where the white around a marker is too narrow for long profiles, short ones are tried.
+    Profiles keep within a cell to both sides of the edge, and are as long as the blur asks for.
     """
-    start = np.empty((4, 2))
+    start, halves, widest, responses = np.empty((4, 2)), np.empty(4), np.empty(4), np.empty(4)
+    floors = np.empty(4)  # a cell narrower than the blur leaves no place to the edge alone
     for m in range(quads.shape[0]):
-        around = 0.0
+        around, cell = 0.0, np.empty(4)
         for k in range(4):
-            side_x, side_y = (
-                quads[m, (k + 1) % 4, 0] - quads[m, k, 0],
-                quads[m, (k + 1) % 4, 1] - quads[m, k, 1],
+            x, y = quads[m, k, 0], quads[m, k, 1]
+            dx, dy = quads[m, (k + 1) % 4, 0] - x, quads[m, (k + 1) % 4, 1] - y
+            length = math.hypot(dx, dy)
+            around += length
+            across = 0.0
+            for i in range(2, 4):
+                px, py = quads[m, (k + i) % 4, 0] - x, quads[m, (k + i) % 4, 1] - y
+                across += 0.5 * abs(px * dy - py * dx) / max(length, 1e-9)
+            cell[k] = across / cells
+            widest[k] = min(max(0.75 * cell[k], SHORTEST_PX), LONGEST_PX)
+            halves[k] = min(max(0.7 * cell[k], 1.5), 3.0)
+            floors[k] = noise[0] + 0.3 * math.exp((1.5 - cell[k]) / 0.6)
+            start[k, 0], start[k, 1] = x, y
+        reach = max(reach_px, 0.085 * around / cells)
+        for turn in range(ROUNDS):
+            refined[m] = refine_quad(
+                image, start, halves, bends[m], floors, responses, noise, corners[m], covs[m]
             )
-            around += math.hypot(side_x, side_y)
-        cell = 0.25 * around / cells
-        reach = max(reach_px, 0.34 * cell)
-        refined[m] = False
-        for half in (
-            min(max(SHORTEST_PX, 0.8 * cell), LONGEST_PX),
-            0.5 * (SHORTEST_PX + LONGEST_PX),
-            SHORTEST_PX,
-        ):
-            start[:] = quads[m]
-            for _ in range(3):
-                refined[m] = refine_quad(image, start, half, floor_px, correlation, corners[m], covs[m])
-                for k in range(4):
-                    if (
-                        math.hypot(corners[m, k, 0] - quads[m, k, 0], corners[m, k, 1] - quads[m, k, 1])
-                        > reach
-                    ):
-                        refined[m] = False
-                if not refined[m]:
-                    corners[m] = quads[m]
-                    break
-                start[:] = corners[m]
-            if refined[m]:
+            moved = 0.0
+            for k in range(4):
+                x, y = corners[m, k, 0], corners[m, k, 1]
+                if math.hypot(x - quads[m, k, 0], y - quads[m, k, 1]) > reach:
+                    refined[m] = False
+                moved = max(moved, math.hypot(x - start[k, 0], y - start[k, 1]))
+            if not refined[m] or (turn > 1 and moved < 0.005):
                 break
+            for k in range(4):
+                start[k, 0], start[k, 1] = corners[m, k, 0], corners[m, k, 1]
+                if turn == 0:
+                    halves[k] = min(widest[k], USUAL_PX)
+                elif responses[k] < 0.75:
+                    halves[k] = min(1.5 * halves[k], widest[k])
+        if not refined[m]:
+            for k in range(4):
+                corners[m, k, 0], corners[m, k, 1] = quads[m, k, 0], quads[m, k, 1]

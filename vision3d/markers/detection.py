@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +27,19 @@ from vision3d.markers.dictionaries import (
     surprise,
 )
 
-__all__ = ["Marker", "detect_markers", "find_markers"]
+if TYPE_CHECKING:
+    from vision3d.camera import Camera
+
+__all__ = ["Marker", "bends_of", "detect_markers", "find_markers"]
 
 Array = NDArray[np.float64]
 
-SYSTEMATIC_PX = 0.015  # what is left of an edge's position with neither noise nor blur: 8 bits, sampling
-CORRELATION = 2.0  # neighbouring profiles share pixels: their mean is worth half as many
+SYSTEMATIC_PX = 0.012  # what is left of an edge's position with neither noise nor blur: 8 bits, sampling
+CORRELATION = 1.5  # neighbouring profiles share pixels: a line is worth fewer of them
 UNREFINED_PX = 0.5  # corners as OpenCV's contours give them
 REACH_PX = 2.5
+CURVATURE_PX = 2e-4  # half the curvature (1/px) that a lens without a name may give to a straight side
+INWARD_PX = 0.5  # a contour runs through the outermost dark pixels
 SMALLEST_PX = 10.0
 
 
@@ -91,28 +96,33 @@ class Marker:
         return float(np.linalg.norm(self.corners - np.roll(self.corners, 1, axis=0), axis=1).mean())
 
 
-def detect_markers(image: NDArray[np.uint8], dictionary: str = "auto") -> tuple[Marker, ...]:
+def detect_markers(
+    image: NDArray[np.uint8], dictionary: str = "auto", *, camera: Camera | None = None
+) -> tuple[Marker, ...]:
     """Find the markers of a dictionary, in the order of their numbers.
 
     Parameters
     ----------
     image : (height, width) or (height, width, 3), 8 bits
     dictionary : its name, as in `vision3d.boards`; "auto" tries every family and keeps the likeliest
+    camera : that took it, if known: its lens says how straight sides are bent in the picture
 
     Raises
     ------
     ShapeError, ModelError
         where the image is no image, or there is no such dictionary.
     """
-    return find_markers(image, dictionary)[0]
+    return find_markers(image, dictionary, camera=camera)[0]
 
 
-def find_markers(image: NDArray[np.uint8], dictionary: str = "auto") -> tuple[tuple[Marker, ...], str | None]:
+def find_markers(
+    image: NDArray[np.uint8], dictionary: str = "auto", *, camera: Camera | None = None
+) -> tuple[tuple[Marker, ...], str | None]:
     """Find markers and say of which dictionary; None where "auto" found nothing."""
     grey = _grey(image)
     if dictionary != "auto":
         name = dictionary_name(dictionary)
-        return _refined(grey, *_squares(grey, name), name), name
+        return _refined(grey, *_squares(grey, name), name, camera), name
     best: tuple[float, str | None] = (0.0, None)
     for family, longest in FAMILIES.items():
         ids = _squares(grey, longest)[1]
@@ -121,7 +131,7 @@ def find_markers(image: NDArray[np.uint8], dictionary: str = "auto") -> tuple[tu
             best = (score, smallest_of(family, int(ids.max())))
     if best[1] is None:
         return (), None
-    return _refined(grey, *_squares(grey, best[1]), best[1]), best[1]
+    return _refined(grey, *_squares(grey, best[1]), best[1], camera), best[1]
 
 
 def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -149,7 +159,7 @@ def _detector(name: str) -> Any:
     import cv2
 
     settings = cv2.aruco.DetectorParameters()
-    settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
+    settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
     return cv2.aruco.ArucoDetector(opencv_dictionary(name), settings)
 
 
@@ -159,7 +169,30 @@ def _squares(grey: NDArray[np.uint8], name: str) -> tuple[Array, NDArray[np.int6
     ids = np.zeros(0, dtype=np.int64) if numbers is None else np.asarray(numbers, dtype=np.int64).reshape(-1)
     quads = np.array([np.asarray(one, dtype=np.float64).reshape(4, 2) for one in found]).reshape(-1, 4, 2)
     order = np.lexsort((-_sides(quads), ids))
-    return np.ascontiguousarray(quads[order]), ids[order]
+    return np.ascontiguousarray(_grown(quads[order])), ids[order]
+
+
+def _grown(quads: Array) -> Array:
+    """Move the sides of quadrilaterals (M, 4, 2) outward by INWARD_PX."""
+    ahead = np.roll(quads, -1, axis=1) - quads
+    ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
+    behind = np.roll(ahead, 1, axis=1)
+    # the outward normals are (dy, -dx) and ask for INWARD_PX both: Cramer's rule
+    sine = behind[..., 0] * ahead[..., 1] - behind[..., 1] * ahead[..., 0]
+    step = (behind - ahead) / np.where(np.abs(sine) > 0.2, sine, np.inf)[..., None]
+    return quads + INWARD_PX * step
+
+
+def bends_of(camera: Camera, quads: Array) -> Array:
+    """How a lens bends the straight sides of quadrilaterals (M, 4, 2): (M, 4) offset / u², px outward."""
+    rays = camera.unproject(quads.reshape(-1, 2)).reshape(-1, 4, 3)
+    middle = camera.project((rays + np.roll(rays, -1, axis=1)).reshape(-1, 3)).reshape(-1, 4, 2)
+    side = np.roll(quads, -1, axis=1) - quads
+    length = np.linalg.norm(side, axis=2)
+    away = middle - quads
+    outward = (away[..., 0] * side[..., 1] - away[..., 1] * side[..., 0]) / length
+    bends: Array = np.nan_to_num(-4.0 * outward)
+    return bends
 
 
 def _sides(quads: Array) -> Array:
@@ -168,7 +201,9 @@ def _sides(quads: Array) -> Array:
     return sides
 
 
-def _refined(grey: NDArray[np.uint8], quads: Array, ids: NDArray[np.int64], name: str) -> tuple[Marker, ...]:
+def _refined(
+    grey: NDArray[np.uint8], quads: Array, ids: NDArray[np.int64], name: str, camera: Camera | None
+) -> tuple[Marker, ...]:
     """Markers with our corners."""
     if not len(ids):
         return ()
@@ -177,7 +212,9 @@ def _refined(grey: NDArray[np.uint8], quads: Array, ids: NDArray[np.int64], name
     corners, covs = np.empty_like(quads), np.zeros((len(ids), 8, 8))
     done = np.zeros(len(ids), dtype=np.bool_)
     cells = DICTIONARIES[name].bits + 2
-    refine_quads(grey, quads, cells, SYSTEMATIC_PX, CORRELATION, REACH_PX, corners, covs, done)
+    noise = np.array([SYSTEMATIC_PX, CORRELATION, CURVATURE_PX if camera is None else 0.1 * CURVATURE_PX])
+    bends = np.zeros(quads.shape[:2]) if camera is None else bends_of(camera, quads)
+    refine_quads(grey, quads, bends, cells, noise, REACH_PX, corners, covs, done)
     covs[~done] = np.eye(8) * UNREFINED_PX**2
     sigmas = np.sqrt(np.diagonal(covs, axis1=1, axis2=2).reshape(-1, 4, 2).mean(axis=2))
     return tuple(

@@ -3,10 +3,13 @@
 import cv2
 import numpy as np
 import pytest
+from marker_worlds import SIZE_M, corners_of, tilted
 
 from sequential.errors import ModelError, ShapeError
+from vision3d.camera import Camera
 from vision3d.markers import detect_markers, find_markers
 from vision3d.markers.dictionaries import DICTIONARIES, opencv_dictionary, smallest_of
+from vision3d.render import Plane, marker_texture, render_planes
 
 
 def drawn(name, identity, quad, size=(320, 240), oversample=8):
@@ -65,3 +68,21 @@ def test_the_six_markers_of_the_tutorial(data_dir):
     found, told = find_markers(picture)
     assert [one.id for one in found] == [23, 40, 62, 98, 124, 203]
     assert told == "6x6_250"
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("side_px", [40, 90])
+def test_corners_meet_rendered_truth_with_an_honest_covariance(side_px, known, rng):
+    """A lens that bends sides: the camera straightens them, or the covariance allows for it."""
+    camera = Camera("brown5", (530, 531, 322, 240), (-0.28, 0.08, 1e-3, -2e-4, 0.02), (640, 480))
+    errors, nees = [], []
+    for identity in range(12):
+        pose = tilted(side_px, 40.0 * rng.random(), rng, camera, at=rng.uniform(-0.3, 0.3, 2))
+        picture = render_planes(camera, [Plane(pose, marker_texture("4x4_50", identity, SIZE_M))], rng=rng)
+        (marker,) = detect_markers(picture, "4x4_50", camera=camera if known else None)
+        assert marker.id == identity
+        error = (marker.corners - corners_of(camera, pose)).ravel()
+        errors.append(error)
+        nees.append(error @ np.linalg.solve(marker.cov_px2, error) / 8.0)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.04
+    assert 0.2 < np.mean(nees) < 1.6
