@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError, FileFormatError
 
-__all__ = ["ImageSet", "LeftOut", "read_image", "read_images"]
+__all__ = ["ImageSet", "LeftOut", "image_paths", "read_image", "read_images"]
 
 Image = NDArray[np.uint8]
 OPAQUE = 255
@@ -61,13 +61,13 @@ class ImageSet:
         return len(self.images)
 
 
-def read_image(path: str | os.PathLike[str], *, colour: bool = False) -> Image:
+def read_image(path: str | os.PathLike[str], *, colour: bool | None = False) -> Image:
     """Read one picture.
 
     Parameters
     ----------
     path : of a picture in any format that OpenCV reads
-    colour : give (h, w, 3) BGR instead of grey levels (h, w)
+    colour : give (h, w, 3) BGR instead of grey levels (h, w); None: whichever the file holds
 
     Returns
     -------
@@ -123,7 +123,7 @@ def read_images(
     DataError
         where there is no picture at all, or where no size is that of most of them.
     """
-    paths = _paths([sources] if isinstance(sources, str | os.PathLike) else list(sources))
+    paths = image_paths(sources)
     names = _short_names(paths)
     images: dict[str, Image] = {}
     left_out: dict[str, str] = {}
@@ -147,12 +147,18 @@ def read_images(
     return ImageSet(tuple(images.items()), size, tuple(LeftOut(*item) for item in listed))
 
 
-def _paths(sources: Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """Files in order, each once."""
+def image_paths(sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
+    """Files of folders, patterns and names, in order, each once.
+
+    Raises
+    ------
+    DataError
+        where a name does not exist, a folder or pattern holds no picture, or nothing was given.
+    """
     from vision3d.frames.files import find_images, is_pattern, require_path
 
     found: list[Path] = []
-    for source in sources:
+    for source in [sources] if isinstance(sources, str | os.PathLike) else sources:
         text = os.fspath(source)
         if is_pattern(text) or require_path(text).is_dir():
             found += find_images(text)
@@ -207,7 +213,7 @@ def _eight_bits(picture: NDArray[Any]) -> Image:
     return narrow
 
 
-def _channels(picture: Image, *, colour: bool) -> Image:
+def _channels(picture: Image, *, colour: bool | None) -> Image:
     import cv2
 
     if picture.ndim == 3 and picture.shape[2] == 2:
@@ -216,6 +222,8 @@ def _channels(picture: Image, *, colour: bool) -> Image:
         opacity = picture[..., 3:].astype(np.uint16)
         over = picture[..., :3] * opacity + OPAQUE * (OPAQUE - opacity)
         picture = ((over + OPAQUE // 2) // OPAQUE).astype(np.uint8)
+    if colour is None:
+        return np.ascontiguousarray(picture[..., 0] if picture.shape[2:] == (1,) else picture)
     if colour:
         wide = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture
         return np.ascontiguousarray(wide, dtype=np.uint8)

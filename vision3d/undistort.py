@@ -162,13 +162,15 @@ def _rectangle(camera: Camera, *, inner: bool) -> tuple[float, float, float, flo
 
 
 def _flat(camera: Camera, pixels: Array) -> Array:
-    """Normalised coordinates (N, 2), at most `STEEPEST` from the axis, also where a pixel has no ray."""
+    """Normalised coordinates (N, 2), no further than the lens and `STEEPEST` reach, also without a ray."""
     outward = (pixels - camera.intrinsics[2:]) / camera.intrinsics[:2]
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
     rays = camera.unproject(pixels)
     across = np.linalg.norm(rays[:, :2], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         flat: Array = rays[:, :2] / rays[:, 2:]
-    steep = ~(across <= STEEPEST * rays[:, 2])
-    flat[steep] = STEEPEST * outward[steep]
+    reach = np.tan(min(camera.limit, 1.5)) if camera.lens == "fisheye4" else camera.limit
+    furthest = min(STEEPEST, reach)
+    steep = ~(across <= furthest * rays[:, 2])
+    flat[steep] = furthest * outward[steep]
     return flat

@@ -16,6 +16,7 @@ from factorlab.cli.info import info
 from factorlab.cli.live import live
 from factorlab.cli.record import record
 from factorlab.cli.tune import tune
+from factorlab.cli.undistort import undistort
 
 __all__ = ["main"]
 
@@ -45,5 +46,18 @@ def main() -> None:
     """
 
 
-for command in (demo, compare, tune, characterize, calibrate, attitude, firmware, record, live, info, doctor):
+for command in (
+    demo,
+    compare,
+    tune,
+    characterize,
+    calibrate,
+    attitude,
+    firmware,
+    record,
+    live,
+    undistort,
+    info,
+    doctor,
+):
     main.add_command(command)
