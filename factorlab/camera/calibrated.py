@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +12,15 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from vision3d.boards import Board
-    from vision3d.calibrate import Calibration
-    from vision3d.calibrate.cross_validation import LeaveOneOut
-    from vision3d.calibrate.uncertainty import ProjectionUncertainty
+    from vision3d.calibrate import (
+        Calibration,
+        Coverage,
+        DifferenceMap,
+        LeaveOneOut,
+        LensChoice,
+        NextPose,
+        ProjectionUncertainty,
+    )
     from vision3d.images import ImageSet
     from vision3d.views import Detections
 
@@ -35,6 +42,8 @@ class CameraSettings:
     window : half-width of the corner refinement, px; None lets every corner have its own
     robust : leave out corners that noise does not explain
     frames : how many frames are taken from a video
+    compare : a file with another calibration of the same camera
+    next_pose : look for the most useful next pose of the board
     """
 
     board: Board
@@ -42,6 +51,8 @@ class CameraSettings:
     window: int | None = None
     robust: bool = True
     frames: int = 40
+    compare: Path | None = None
+    next_pose: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +61,10 @@ class CalibratedCamera:
 
     Parameters
     ----------
+    choice : the lenses that were tried
     cross : every view predicted from the others
+    following : where the board would tell most next
+    difference : from the calibration to compare with
     seconds : what took how long
     """
 
@@ -58,7 +72,10 @@ class CalibratedCamera:
     pictures: ImageSet
     detections: Detections
     calibration: Calibration
+    choice: LensChoice | None
     cross: LeaveOneOut | None
+    following: NextPose | None
+    difference: DifferenceMap | None
     seconds: dict[str, float]
 
     @property
@@ -73,16 +90,23 @@ class CalibratedCamera:
         return left_out | {one.name: one.reason for one in self.detections.missed}
 
     @cached_property
+    def coverage(self) -> Coverage:
+        """Where the board was held, and what is missing."""
+        from vision3d.calibrate import coverage
+
+        return coverage(self.calibration)
+
+    @cached_property
     def uncertainty(self) -> ProjectionUncertainty:
         """How sure the projection of a direction is, over the image."""
-        from vision3d.calibrate.uncertainty import projection_uncertainty
+        from vision3d.calibrate import projection_uncertainty
 
         return projection_uncertainty(self.calibration, grid=GRID)
 
     @cached_property
     def uncertainty_freed(self) -> ProjectionUncertainty:
         """The same less the turn of the whole camera that explains most of it."""
-        from vision3d.calibrate.uncertainty import projection_uncertainty
+        from vision3d.calibrate import projection_uncertainty
 
         return projection_uncertainty(self.calibration, freed_rotation=True, grid=GRID)
 

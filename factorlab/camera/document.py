@@ -28,6 +28,14 @@ COVERAGE_READ = (
     "Left: the image needs corners out to its borders. Right: from which side and how obliquely the board "
     "was seen; views in the middle of the circles alone do not tell the focal length."
 )
+LENSES_TOLD = (
+    "Every lens model is fitted to all pictures, and to all but one in turn; the picture left out is then "
+    "predicted. Of models that predict equally well (within 1 %), the one with fewest coefficients is taken."
+)
+DIFFERENCE_READ = (
+    "The same ray through both cameras, once the second is turned to fit the first best: where the other "
+    "camera puts what this one sees."
+)
 UNCERTAINTY_READ = (
     "Standard deviation of where a direction falls in the image. Left: as an application sees it that trusts "
     "the camera's axes. Right: less the turn of the whole camera that explains most, for one that finds the "
@@ -58,14 +66,37 @@ def _sections(done: CalibratedCamera) -> list[Section]:
 
     return [
         Section("Camera", "", _constants(done)),
+        *([] if done.choice is None else [Section("Lens models", LENSES_TOLD, _lenses(done))]),
         Section("Residuals over the image", "", None, lambda: figures.residual_field(done), FIELD_READ),
         Section("Residuals and their σ", "", None, lambda: figures.residual_scatter(done), SCATTER_READ),
         Section("Views", "", _views(done), lambda: figures.view_errors(done), VIEWS_READ, page_only=True),
         Section("Coverage", "", None, lambda: figures.coverage(done), COVERAGE_READ),
         Section("How sure a projection is", "", None, lambda: maps.uncertainty_map(done), UNCERTAINTY_READ),
+        *_compared(done),
         Section("Corners to look at", "", None, lambda: _cutouts(done), CUTOUTS_READ),
         Section("Pictures", "", None, lambda: _thumbnails(done), PICTURES_READ),
     ]
+
+
+def _compared(done: CalibratedCamera) -> list[Section]:
+    from factorlab.report import camera_maps as maps
+
+    if done.difference is None or done.settings.compare is None:
+        return []
+    title = f"Difference from {done.settings.compare.name}"
+    return [Section(title, "", None, lambda: maps.difference_map(done), DIFFERENCE_READ)]
+
+
+def _lenses(done: CalibratedCamera) -> Table:
+    """Every lens that was tried, the one that was taken marked."""
+    assert done.choice is not None  # noqa: S101 - the caller has looked
+    rows = []
+    for row in done.choice.table:
+        remark = "taken" if row.lens == done.choice.chosen else row.remark
+        rms = [value if np.isfinite(value) else None for value in (row.train_rms_px, row.held_out_rms_px)]
+        rows.append((row.lens, row.coefficients, *rms, remark))
+    headings = ("lens", "coefficients", ("RMS", "px"), ("left out", "px"), "")
+    return Table(headings, tuple(rows), digits=4)
 
 
 def _cutouts(done: CalibratedCamera) -> Figure | None:

@@ -20,9 +20,13 @@ POSE_COLUMNS = (
 )
 
 
-def export_files(done: CalibratedCamera, command: str = "") -> dict[str, str | bytes]:
-    """Names and contents of the files of the folder."""
-    return {"corners.csv": corners_csv(done), "poses.csv": poses_csv(done)}
+def export_files(done: CalibratedCamera) -> dict[str, str | bytes]:
+    """Names and contents of the files of the folder: the camera in every format that can say its lens."""
+    from vision3d.camera_files import formats_for
+
+    camera = done.calibration.camera
+    files: dict[str, str | bytes] = {one.file_name: one.text(camera, "camera") for one in formats_for(camera)}
+    return files | {"corners.csv": corners_csv(done), "poses.csv": poses_csv(done)}
 
 
 def corners_csv(done: CalibratedCamera) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -11,13 +12,16 @@ from factorlab.camera.calibrated import CalibratedCamera, CameraSettings
 from sequential.errors import DataError
 
 if TYPE_CHECKING:
-    from vision3d.calibrate import Calibration
+    from vision3d.calibrate import Calibration, LensChoice
+    from vision3d.camera import Camera
     from vision3d.images import ImageSet
     from vision3d.views import Detections
 
 __all__ = ["calibrate_held", "calibrate_pictures"]
 
 Say = Callable[[str], None]
+FEWEST = 3  # views of which none can be left out
+FEW_LENS = "brown2"
 
 
 def silent(text: str) -> None:
@@ -45,21 +49,45 @@ def calibrate_pictures(
     pictures = open_pictures(given, settings.frames)
     for one in pictures.left_out:
         say(f"left out: {one}")
-    return calibrate_held(pictures, settings, say=say)
+    other = None if settings.compare is None else compared(settings.compare, pictures.size)
+    return calibrate_held(pictures, settings, other=other, say=say)
 
 
-def calibrate_held(pictures: ImageSet, settings: CameraSettings, *, say: Say = silent) -> CalibratedCamera:
-    """Calibrate from pictures in memory; raises as `calibrate_pictures`."""
-    from vision3d.calibrate.cross_validation import leave_one_out
+def compared(path: Path, size: tuple[int, int]) -> Camera:
+    """The camera of a file to compare with.
+
+    Raises
+    ------
+    DataError
+        where there is none, or it is of another image size.
+    """
+    from vision3d.camera_files import read_camera
+
+    other = read_camera(path, size=size)
+    if other.size != size:
+        raise DataError(
+            f"{path} is a camera of {other.size[0]}x{other.size[1]} pixels, and the pictures are "
+            f"{size[0]}x{size[1]}: they cannot be compared"
+        )
+    return other
+
+
+def calibrate_held(
+    pictures: ImageSet, settings: CameraSettings, *, other: Camera | None = None, say: Say = silent
+) -> CalibratedCamera:
+    """Calibrate from pictures in memory; `other` is what to compare with.  Raises as `calibrate_pictures`."""
+    from vision3d.calibrate import difference, leave_one_out, next_pose
 
     seconds: dict[str, float] = {}
     with timed(seconds, "detection"):
         detections = detected(pictures, settings, say)
     with timed(seconds, "lens"):
-        fit = _fitted(detections, settings)
+        choice, fit = _fitted(detections, settings, say)
     with timed(seconds, "checks"):
-        cross = leave_one_out(fit) if len(fit.views) > 3 else None
-    return CalibratedCamera(settings, pictures, detections, fit, cross, seconds)
+        cross = leave_one_out(fit) if len(fit.views) > FEWEST else None
+        following = next_pose(fit, settings.board) if settings.next_pose else None
+        apart = None if other is None else difference(fit, other)
+    return CalibratedCamera(settings, pictures, detections, fit, choice, cross, following, apart, seconds)
 
 
 def detected(pictures: ImageSet, settings: CameraSettings, say: Say) -> Detections:
@@ -83,12 +111,21 @@ def detected(pictures: ImageSet, settings: CameraSettings, say: Say) -> Detectio
     return detections
 
 
-def _fitted(detections: Detections, settings: CameraSettings) -> Calibration:
-    """The calibration, with the lens asked for."""
-    from vision3d.calibrate import calibrate
+def _fitted(
+    detections: Detections, settings: CameraSettings, say: Say
+) -> tuple[LensChoice | None, Calibration]:
+    """The calibration with the lens asked for, or with the one that predicts best."""
+    from vision3d.calibrate import calibrate, choose_lens
 
-    lens = "brown5" if settings.lens == "auto" else settings.lens
-    return calibrate(detections.views, lens, robust=settings.robust)
+    views = detections.views
+    if settings.lens == "auto" and len(views) > FEWEST:
+        choice = choose_lens(views, robust=settings.robust)
+        return choice, choice.calibration
+    lens = FEW_LENS if settings.lens == "auto" else settings.lens
+    fit = calibrate(views, lens, robust=settings.robust)
+    if settings.lens == "auto":
+        say(f"{len(views)} pictures are too few to choose a lens by: {FEW_LENS} was taken")
+    return None, fit
 
 
 @contextmanager

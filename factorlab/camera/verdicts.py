@@ -12,7 +12,7 @@ __all__ = ["judged", "verdicts_of"]
 GOOD_RATIO, FAIR_RATIO = 1.15, 1.6  # left-out views over fitted ones: good, and still of use
 GOOD_FOCAL, FAIR_FOCAL = 0.002, 0.01  # standard deviation of the focal length, relative
 STEEP, FLAT = np.radians(25.0), np.radians(12.0)  # largest tilt of the board: good, and too little
-GOOD_PX, FAIR_PX = 0.5, 2.0  # projection uncertainty where the image is worst
+GOOD_PLACE, FAIR_PLACE = 0.001, 0.01  # σ of a projection where it is worst, over the image's diagonal
 GOOD_SCATTER, FAIR_SCATTER = 0.5, 1.5  # RMS of residuals, px
 ENOUGH_VIEWS = 8
 TILT_MORE = "tilt the board by 30 to 45° about its vertical and its horizontal axis"
@@ -21,8 +21,8 @@ TILT_MORE = "tilt the board by 30 to 45° about its vertical and its horizontal 
 def verdicts_of(done: CalibratedCamera) -> tuple[Verdict, ...]:
     """Pictures, corners, residuals, left-out views, lens, uncertainty, poses: in the order of a reader."""
     found = [_pictures(done), *_window(done), *_corners(done), _residuals(done)]
-    found += [*_left_out(done), _fold(done), _focal(done), *_projection(done)]
-    found += [_tilt(done), *_others(done)]
+    found += [*_left_out(done), *_lens(done), _fold(done), _focal(done), *_projection(done)]
+    found += [_tilt(done), _coverage(done), *_following(done), *_apart(done), *_others(done)]
     return tuple(found)
 
 
@@ -97,6 +97,12 @@ def _left_out(done: CalibratedCamera) -> list[Verdict]:
     return [Verdict("left-out pictures, RMS", done.cross.rms_px, None, status, meaning, action, "px")]
 
 
+def _lens(done: CalibratedCamera) -> list[Verdict]:
+    if done.choice is None:
+        return []
+    return [Verdict("lens model", done.choice.chosen, None, "INFO", done.choice.why)]
+
+
 def _fold(done: CalibratedCamera) -> Verdict:
     fold = done.calibration.camera.check_monotonic()
     if fold.inside:
@@ -119,7 +125,7 @@ def _projection(done: CalibratedCamera) -> list[Verdict]:
     """How sure a projection is in the middle and where it is worst."""
     std = done.uncertainty.map_px
     worst, middle = float(np.nanmax(std)), float(std[std.shape[0] // 2, std.shape[1] // 2])
-    status = judged(worst, GOOD_PX, FAIR_PX)
+    status = judged(worst / float(np.hypot(*done.calibration.camera.size)), GOOD_PLACE, FAIR_PLACE)
     place = done.worst_place
     meaning = f"where the image is least known, {place}; {middle:.2g} px in the middle"
     action = "" if status == "PASS" else f"put the board into the {place}"
@@ -134,14 +140,56 @@ def _tilt(done: CalibratedCamera) -> Verdict:
     return Verdict("largest tilt", float(np.degrees(steepest)), None, status, meaning, action, "°")
 
 
+def _coverage(done: CalibratedCamera) -> Verdict:
+    """How much of the image holds corners, and what the views lack."""
+    found = done.coverage
+    status: Status = "PASS" if not found.advice else "WARN"
+    meaning = "share of the image with corners; its corners, tilts and distances are all there"
+    if found.advice:
+        meaning = (
+            f"share of the image with corners; corners in {4 * found.image_corners:.0f} of its 4 corners"
+        )
+    return Verdict("coverage", 100 * found.image, None, status, meaning, "; ".join(found.advice), "%")
+
+
+def _following(done: CalibratedCamera) -> list[Verdict]:
+    """Where the board would tell most."""
+    if (found := done.following) is None:
+        return []
+    meaning = (
+        f"σ of a projection, RMS over the image, would fall from {found.std_before_px:.2g} to "
+        f"{found.std_after_px:.2g} px"
+    )
+    return [Verdict("most useful next picture", None, None, "INFO", meaning, found.words)]
+
+
+def _apart(done: CalibratedCamera) -> list[Verdict]:
+    """How far the calibration to compare with is."""
+    if (found := done.difference) is None or done.settings.compare is None:
+        return []
+    status: Status = "PASS" if found.sigmas < 2.0 else "WARN" if found.sigmas < 4.0 else "FAIL"
+    action = (
+        ""
+        if status == "PASS"
+        else "trust the one whose pictures cover the image, and whose corners are right"
+    )
+    metric = f"difference from {done.settings.compare.name}, RMS"
+    return [Verdict(metric, found.rms_px, None, status, found.words, action, "px")]
+
+
 def _others(done: CalibratedCamera) -> list[Verdict]:
     """What the detector and the solver say besides."""
     fit = done.calibration
     found = []
-    if any(audit.mirrored for audit in done.detections.audits):
-        names = [audit.name for audit in done.detections.audits if audit.mirrored]
-        meaning = f"{len(names)} pictures show the board mirrored ({', '.join(names[:3])} …)"
+    names = [audit.name for audit in done.detections.audits if audit.mirrored]
+    if names:
+        meaning = f"{', '.join(names[:4])}{' …' if len(names) > 4 else ''} show the board mirrored"
         found.append(Verdict("mirrored pictures", len(names), None, "FAIL", meaning, "flip them back"))
+    for text in done.detections.findings:
+        if "mirrored against" in text:
+            found.append(Verdict("mirrored pictures", None, None, "FAIL", text))
+        elif "window" not in text:
+            found.append(Verdict("detection", None, None, "INFO", text))
     for view in fit.outlier_views:
         ratio = fit.view_rms[view] / float(np.median(fit.view_rms))
         meaning = f"{fit.views[view].name} fits {ratio:.1f} times worse than the others and counts less"

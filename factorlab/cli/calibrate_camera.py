@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from factorlab.cli.faults import in_one_sentence
-from factorlab.cli.settings import as_json, check_option, command_line, config_option
+from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
 
 if TYPE_CHECKING:
     from factorlab.camera import CameraSettings
@@ -19,59 +20,46 @@ KINDS = ("checkerboard", "charuco", "circles", "acircles")
 LENSES = ("auto", "pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "thin12", "fisheye4")
 
 
+OPTIONS: tuple[Callable[[Command], Command], ...] = (
+    click.argument("sources", metavar="IMAGES…", nargs=-1, required=True),
+    click.option("--board", "board_text", metavar="COLSxROWS", required=True,
+                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles."),
+    click.option("--square", metavar="LENGTH", required=True,
+                 help="Side of a square, or distance of circles: 25mm, 2.5cm, 0.025m."),
+    click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
+                 help="What is on the board."),
+    click.option("--marker", metavar="LENGTH",
+                 help="Side of the markers of a ChArUco board: 18mm.  [default: 0.75 of the square]"),
+    click.option("--dictionary", metavar="NAME", help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
+    click.option("--lens", type=click.Choice(LENSES), default="auto", show_default=True,
+                 help="Lens model; auto takes the one that predicts pictures best that it has not seen."),
+    click.option("--window", type=click.IntRange(1, 60), metavar="N",
+                 help="Half-width of the corner window, px.  [default: from the squares, corner by corner]"),
+    click.option("--frames", type=click.IntRange(3, 500), default=40, show_default=True, metavar="N",
+                 help="Pictures taken from a video: the sharpest of N equal stretches."),
+    click.option("--compare", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+                 help="Another calibration of the camera, in any format: a map of how they differ."),
+    click.option("--next-pose/--no-next-pose", default=True, show_default=True,
+                 help="Find where the board would tell most next."),
+    click.option("--all-corners", is_flag=True, help="Keep corners that noise does not explain."),
+    as_json,
+    click.option("-o", "--out", type=click.Path(path_type=Path), metavar="DIR",
+                 help="Write the report, the camera in five formats, corners.csv and poses.csv here."),
+    click.option("--force", is_flag=True, help="Write over an earlier report in DIR."),
+    check_option,
+    config_option,
+)  # fmt: skip
+
+
+def camera_options(command: Command) -> Command:
+    """Argument and options of the command."""
+    for option in reversed(OPTIONS):
+        command = option(command)
+    return command
+
+
 @click.command(short_help="Camera, from pictures of a checkerboard, ChArUco or circles.")
-@click.argument("sources", metavar="IMAGES…", nargs=-1, required=True)
-@click.option(
-    "--board",
-    "board_text",
-    metavar="COLSxROWS",
-    required=True,
-    help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles of a grid.",
-)
-@click.option(
-    "--square",
-    metavar="LENGTH",
-    required=True,
-    help="Side of a square, or distance of circles: 25mm, 2.5cm, 0.025m.",
-)
-@click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True, help="Board.")
-@click.option("--marker", metavar="LENGTH", help="Side of the markers of a ChArUco board: 18mm.")
-@click.option("--dictionary", metavar="NAME", help="Their dictionary: 4x4_50, 6x6_250 …")
-@click.option(
-    "--lens",
-    type=click.Choice(LENSES),
-    default="auto",
-    show_default=True,
-    help="Lens model; auto takes the one that predicts views best that it has not seen.",
-)
-@click.option(
-    "--window",
-    type=click.IntRange(1, 60),
-    metavar="N",
-    help="Half-width of the refinement window, px.  [default: from the squares, corner by corner]",
-)
-@click.option(
-    "--frames",
-    type=click.IntRange(3, 500),
-    default=40,
-    show_default=True,
-    metavar="N",
-    help="Pictures taken from a video: the sharpest of N equal stretches.",
-)
-@click.option(
-    "--all-corners", is_flag=True, help="Count every corner fully; the default weighs outliers down."
-)
-@as_json
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Write the report, the camera in five formats, corners.csv and poses.csv here.",
-)
-@click.option("--force", is_flag=True, help="Write over an earlier report in DIR.")
-@check_option
-@config_option
+@camera_options
 @in_one_sentence
 def camera(sources: tuple[str, ...], **options: Any) -> int:
     """Intrinsics and distortion of a camera, with their uncertainty, from IMAGES of a board.
@@ -95,7 +83,7 @@ def camera(sources: tuple[str, ...], **options: Any) -> int:
         out=options["out"],
         force=options["force"],
         check=options["check"],
-        files=export_files(done, command) if options["out"] is not None else None,
+        files=export_files(done) if options["out"] is not None else None,
     )
 
 
@@ -122,4 +110,6 @@ def _settings(options: dict[str, Any]) -> CameraSettings:
         window=options["window"],
         robust=not options["all_corners"],
         frames=options["frames"],
+        compare=options["compare"],
+        next_pose=options["next_pose"],
     )

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from factorlab.report.style import WIDTH, blank, legend_below
+from sequential.manifold.quaternion import rotation_matrix
 
 if TYPE_CHECKING:
     from factorlab.camera.calibrated import CalibratedCamera
@@ -163,6 +164,8 @@ def coverage(done: CalibratedCamera) -> Figure | None:
     for view in fit.views:
         left.plot(*view.pixels.T, ".", color=FITTED, markersize=2.2)
         left.fill(*_hull(view.pixels).T, facecolor=FITTED, edgecolor=FITTED, alpha=0.06, linewidth=0.6)
+    if (following := done.following) is not None:
+        left.fill(*following.outline_px.T, fill=False, edgecolor=NEXT, linewidth=1.8, linestyle="--")
     frame_axes(left, fit.camera.size)
     left.set_title("corners of all views")
     _tilts(right, done)
@@ -184,6 +187,10 @@ def _tilts(ax: Axes, done: CalibratedCamera) -> None:
     ax.scatter(
         normals[:, 0], normals[:, 1], s=area, color=FITTED, alpha=0.75, label="a view, larger is nearer"
     )
+    if done.following is not None:
+        normal = rotation_matrix(done.following.camera_T_board[:4])[:, 2]
+        look: dict[str, Any] = {"color": NEXT, "markersize": 10, "markeredgewidth": 2.2}
+        ax.plot(*normal[:2], "x", linestyle="none", label="the next, as advised", **look)
     ax.set(xlim=(-0.95, 0.95), ylim=(0.95, -0.95))
     ax.set_title("tilt of the board", loc="center")
 

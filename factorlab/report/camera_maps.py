@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-__all__ = ["uncertainty_map"]
+__all__ = ["difference_map", "uncertainty_map"]
 
 
 def uncertainty_map(done: CalibratedCamera) -> Figure | None:
@@ -35,6 +35,27 @@ def uncertainty_map(done: CalibratedCamera) -> Figure | None:
         ax.plot(*dots.T, ".", color="white", markersize=1.2, alpha=0.55)
         ax.set_title(title)
     figure.colorbar(drawn[0], ax=list(axes[0]), shrink=0.8, label="σ of a projection, px", format=plain)
+    return figure
+
+
+def difference_map(done: CalibratedCamera) -> Figure | None:
+    """By how many pixels two calibrations disagree about the same ray, and in which direction."""
+    if (found := done.difference) is None:
+        return None
+    size = done.calibration.camera.size
+    figure, axes = blank(height_of(size), 1, 2)
+    left, right = axes[0]
+    shown = _map(left, found.pixels, found.map_px, size, levels_of(found.map_px), "magma")
+    left.set_title("distance, px")
+    figure.colorbar(shown, ax=left, shrink=0.8, format=plain)
+    columns, rows = found.grid
+    vectors = found.vectors.reshape(rows, columns, 2)[::2, ::2]
+    at = found.pixels.reshape(rows, columns, 2)[::2, ::2]
+    gain = 0.06 * size[0] / max(float(np.nanpercentile(found.distance_px, 90)), 1e-9)
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0025}
+    right.quiver(*np.moveaxis(at, -1, 0), *(gain * np.moveaxis(vectors, -1, 0)), color="#0072B2", **look)
+    frame_axes(right, size)
+    right.set_title(f"direction, {gain:.3g} times enlarged")
     return figure
 
 

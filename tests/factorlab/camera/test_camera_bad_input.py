@@ -110,7 +110,7 @@ def test_a_picture_without_board_is_named(copies):
 
 @pytest.mark.parametrize("wrong", ["8x6", "9x7", "10x7"])
 def test_the_wrong_board_is_told_from_what_is_seen(photos, wrong):
-    refused("9x6", *photos.paths[:4], "--board", wrong, "--square", "25mm")
+    refused("9x6", *photos.paths[:2], "--board", wrong, "--square", "25mm")
 
 
 def test_too_few_views(photos):
@@ -122,6 +122,16 @@ def test_views_that_are_all_parallel_say_what_is_missing(tmp_path, rng):
     poses[:, :4] = (1.0, 0.0, 0.0, 0.0)
     parallel = photographed(tmp_path, 5, poses=poses)
     refused("focal length.*tilted", *parallel.paths, *OPTIONS)
+
+
+def test_pictures_that_are_mirrored_against_the_others_are_told(tmp_path):
+    odd = photographed(tmp_path, 8, seed=5, board=Checkerboard(7, 5, 0.03))
+    for path in odd.paths[:3]:
+        cv2.imwrite(str(path), cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)[:, ::-1])
+    done = run(*odd.paths, "--board", "7x5", "--square", "30mm", "--no-next-pose")
+    assert done.exit_code == 0
+    assert "view01.png, view02.png, view03.png are mirrored" in done.stderr
+    assert "mirrored" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -138,3 +148,11 @@ def test_views_that_are_all_parallel_say_what_is_missing(tmp_path, rng):
 )
 def test_a_wrong_command_line(photos, options, said):
     refused(said, photos.folder, *options, code=2)
+
+
+@pytest.mark.parametrize("content", [None, "", "camera: yes", '{"schema": 1}'])
+def test_a_file_to_compare_with_is_looked_at_first(photos, tmp_path, content):
+    other = tmp_path / "other.yaml"
+    if content is not None:
+        other.write_text(content, encoding="utf-8")
+    refused("other.yaml", photos.folder, *OPTIONS, "--compare", other)
