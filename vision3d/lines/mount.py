@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError
-from sequential.manifold.quaternion import quaternion_exp, quaternion_multiply
+from sequential.manifold.quaternion import quaternion_exp, quaternion_multiply, rotation_matrix
+from sequential.manifold.so3 import skew
 from vision3d.rigid import compose, inverse
 
-__all__ = ["CameraMount", "planar_pose"]
+__all__ = ["CameraMount", "planar_pose", "plane_homography"]
 
 Array = NDArray[np.float64]
 LEVEL = np.array([0.5, -0.5, 0.5, -0.5])  # camera z is forward, x is right, y is down
@@ -64,3 +65,27 @@ def planar_pose(x_m: float, y_m: float, heading_rad: float) -> Array:
     """The pose (7,) of something that stands on the ground and has turned to the left by `heading_rad`."""
     half = 0.5 * heading_rad
     return np.array([np.cos(half), 0.0, 0.0, np.sin(half), x_m, y_m, 0.0])
+
+
+def plane_homography(ground_T_camera: Array) -> tuple[Array, Array]:
+    """The map from rays (x/z, y/z, 1) of a camera to where they meet z = 0, and how it changes.
+
+    Returns
+    -------
+    tuple
+        ground_H_camera (3, 3), whose third row is positive below the horizon, and the derivatives (9, 6) of
+        its elements, row by row, by the pose: right exponential, rotation then translation.
+    """
+    rotation, place = rotation_matrix(ground_T_camera[:4]), ground_T_camera[4:]
+    jacobian = np.zeros((9, 6))
+    for k, axis in enumerate(np.eye(3)):
+        turn = rotation @ skew(axis)
+        jacobian[:, k] = (-_meeting(turn, place)).ravel()
+        jacobian[:6, 3 + k] = -_meeting(rotation, rotation[:, k])[:2].ravel()
+    return -_meeting(rotation, place), jacobian
+
+
+def _meeting(rotation: Array, place: Array) -> Array:
+    """Linear in the rotation, and in the place but for its last row."""
+    x, y, z = place
+    return np.array([x * rotation[2] - z * rotation[0], y * rotation[2] - z * rotation[1], rotation[2]])

@@ -99,6 +99,14 @@ class GroundLine:
     @cached_property
     def texture(self) -> Texture:
         """The stripe and a metre of ground round it."""
+        return self._painted(self.floor)
+
+    @cached_property
+    def stripe(self) -> Texture:
+        """The stripe alone; one sees through to what lies beside it."""
+        return self._painted(-1.0)
+
+    def _painted(self, floor: float) -> Texture:
         from scipy.spatial import KDTree
 
         low, high = self.points.min(axis=0) - 1.0, self.points.max(axis=0) + 1.0
@@ -111,7 +119,7 @@ class GroundLine:
             _to_segment(grid, self.points, np.minimum(nearest, last - 1)),
         )
         field = (distance - 0.5 * self.width_m).reshape(len(y), len(x))
-        return distance_field(x, y, field, within=self.ink, without=self.floor)
+        return distance_field(x, y, field, within=self.ink, without=floor)
 
 
 def _to_segment(grid: Array, points: Array, first: NDArray[np.int64]) -> Array:
@@ -175,27 +183,33 @@ class RobotView:
 
 
 def render_ground(
-    camera: Camera, mount: CameraMount, line: GroundLine, pose: Array, *, moving: Any = None, **settings: Any
+    camera: Camera,
+    mount: CameraMount,
+    line: GroundLine | Sequence[GroundLine],
+    pose: Array,
+    *,
+    moving: tuple[float, float, float] | None = None,
+    **settings: Any,
 ) -> NDArray[np.uint8]:
-    """What a robot at `pose` (x, y, heading) sees of a line.
+    """What a robot at `pose` (x, y, heading) sees of a line, or of several.
 
     Parameters
     ----------
+    line : the first of several brings the ground with it
     moving : (speed m/s, turn rate rad/s, shutter s), which blurs the image; None for a robot at rest
     settings : of `render_planes`
     """
     place = mount.world_pose(planar_pose(*pose))
-    if moving is None:
-        return render_planes(camera, [Plane(place, line.texture)], **settings)
-    # the world moves against the robot: in the world's frame a point turns and shifts the other way
-    speed, rate, shutter = moving
-    turn = -rate * shutter
-    spin = np.array([0.0, 0.0, turn])
-    about = np.cross(-spin, [pose[0], pose[1], 0.0])
-    shift = -speed * shutter * np.array([np.cos(pose[2]), np.sin(pose[2]), 0.0])
-    return render_planes(
-        camera, [Plane(place, line.texture, motion=np.concatenate([spin, shift + about]))], **settings
-    )
+    motion = None
+    if moving is not None:
+        # the world moves against the robot: in its own frame it turns and shifts the other way
+        speed, rate, shutter = moving
+        spin = np.array([0.0, 0.0, -rate * shutter])
+        shift = -speed * shutter * np.array([np.cos(pose[2]), np.sin(pose[2]), 0.0])
+        motion = np.concatenate([spin, shift - np.cross(spin, [pose[0], pose[1], 0.0])])
+    first, *others = [line] if isinstance(line, GroundLine) else line
+    planes = [Plane(place, first.texture, motion), *(Plane(place, one.stripe, motion) for one in others)]
+    return render_planes(camera, planes, **settings)
 
 
 def drive(
