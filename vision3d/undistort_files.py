@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from sequential.errors import DataError, FileFormatError, ShapeError
 from vision3d.frames import open_frames
-from vision3d.frames.files import IMAGE_SUFFIXES, find_images, is_pattern, require_path
+from vision3d.frames.files import IMAGE_SUFFIXES
 from vision3d.images import LeftOut, read_image
 from vision3d.undistort import Undistorter
 
-__all__ = ["Undistorted", "sources_to_undistort", "undistort_files"]
+__all__ = ["Undistorted", "undistort_files"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -30,23 +29,6 @@ class Undistorted:
 
     written: tuple[tuple[str, str], ...]
     left_out: tuple[LeftOut, ...]
-
-
-def sources_to_undistort(given: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    """Pictures and videos of names, folders and patterns, in order, each once.
-
-    Raises
-    ------
-    DataError
-        where a name does not exist, or nothing was given.
-    """
-    found: list[Path] = []
-    for one in given:
-        text = os.fspath(one)
-        found += find_images(text) if is_pattern(text) or require_path(text).is_dir() else [Path(text)]
-    if not found:
-        raise DataError("nothing to undistort was given; name pictures, a folder, a pattern or a video")
-    return list(dict.fromkeys(found))
 
 
 def undistort_files(

@@ -60,12 +60,13 @@ def undistort(sources: tuple[str, ...], **options: Any) -> int:
     from factorlab.cli.progress import bar
     from factorlab.report.folder import MANIFEST, require_free, whole_folder
     from vision3d.camera_files import formats_for
+    from vision3d.images import image_paths
     from vision3d.undistort import Undistorter
-    from vision3d.undistort_files import sources_to_undistort, undistort_files
+    from vision3d.undistort_files import undistort_files
 
     out = options["out"]
     require_free(out, force=options["force"])
-    paths = sources_to_undistort(sources)
+    paths = image_paths(sources)
     camera = _camera(options["camera_file"], options["which"], paths)
     undistorter = Undistorter.of(camera, view=options["view"])
     with (
