@@ -26,6 +26,7 @@ __all__ = ["ImageSet", "LeftOut", "image_paths", "read_image", "read_images"]
 
 Image = NDArray[np.uint8]
 OPAQUE = 255
+RAW_SUFFIXES = frozenset((".arw", ".cr2", ".cr3", ".dng", ".nef", ".orf", ".raf", ".rw2"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +93,12 @@ def read_image(path: str | os.PathLike[str], *, colour: bool | None = False) -> 
         raise FileFormatError(
             f"{where} is cut off: it ends before its picture does; copy it again from the camera"
         )
-    picture = _decoded(content)
+    raw = where.suffix.lower() in RAW_SUFFIXES  # a TIFF to OpenCV, which would give the preview in it
+    picture = None if raw else _decoded(content)
     if picture is None:
-        raise FileFormatError(f"{where} cannot be read as a picture; is it one, and whole?")
+        kind = "raw data of a sensor" if raw else "HEIC, as telephones write it" if _is_heic(content) else ""
+        hint = f"it is {kind}; convert it to PNG or JPEG first" if kind else "is it one, and whole?"
+        raise FileFormatError(f"{where} cannot be read as a picture; {hint}")
     if picture.dtype not in (np.uint8, np.uint16):
         raise FileFormatError(
             f"{where} holds {picture.dtype} numbers; pictures of 8 or 16 bits are read, save it as PNG"
@@ -186,6 +190,10 @@ def _decoded(content: bytes) -> NDArray[Any] | None:
             return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
         except cv2.error:
             return None
+
+
+def _is_heic(content: bytes) -> bool:
+    return content[4:8] == b"ftyp" and content[8:12] in {b"heic", b"heix", b"hevc", b"mif1", b"msf1"}
 
 
 def _cut_off(content: bytes) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from sequential.errors import DataError, NotFiniteError, ShapeError, UnderConstrainedError
 from sequential.manifold.quaternion import rotate
 from vision3d.camera import Array, Camera
-from vision3d.pose_start import starting_poses
+from vision3d.pose_start import frontal_pose, starting_poses
 
 __all__ = ["PoseEstimate", "estimate_pose", "estimate_poses", "project_object", "transform_points"]
 
@@ -106,6 +106,11 @@ def estimate_poses(
         estimate = _refined(camera, points, pixels, sigma, one, robust=robust)
         if estimate is not None and not any(_same(estimate, other) for other in found):
             found.append(estimate)
+    if not found:
+        estimate = _refined(
+            camera, points, pixels, sigma, frontal_pose(camera, points, pixels), robust=robust
+        )
+        found += [estimate] if estimate is not None else []
     if not found:
         raise DataError(
             "no pose brings the points in front of the camera and near their pixels; are points and pixels "

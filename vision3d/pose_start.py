@@ -13,7 +13,7 @@ from sequential.manifold.quaternion import (
 )
 from vision3d.camera import Array, Camera
 
-__all__ = ["flipped", "starting_poses"]
+__all__ = ["flipped", "frontal_pose", "starting_poses"]
 
 LINE, PLANE, FLAT = 1e-6, 1e-6, 0.3
 """Extents relative to the largest: below them points lie on a line, on a plane, or nearly so."""
@@ -72,6 +72,30 @@ def flipped(camera_T_object: Array, centre: Array, normal: Array) -> Array:
     sight = place / np.linalg.norm(place)
     mirrored = (np.eye(3) - 2.0 * np.outer(sight, sight)) @ R @ (np.eye(3) - 2.0 * np.outer(normal, normal))
     return _pose(mirrored, place - mirrored @ centre)
+
+
+def frontal_pose(camera: Camera, points: Array, pixels: Array) -> Array:
+    """The pose (7,) of an object that faces the camera, as large and turned as its pixels say.
+
+    A start that noise cannot spoil: the homography of a dozen pixels may put points behind the camera.
+    """
+    rays = camera.unproject(pixels)
+    seen = np.isfinite(rays[:, 0])
+    rays, points = rays[seen], points[seen]
+    sight = rays.mean(axis=0)
+    basis = np.linalg.svd(sight[None])[2][[1, 2, 0]]
+    basis *= np.sign(np.array([1.0, 1.0, basis[2] @ sight]))[:, None]
+    basis[0] *= np.linalg.det(basis)
+    centre = points.mean(axis=0)
+    axes = np.linalg.svd(points - centre, full_matrices=False)[2]
+    axes[2] *= np.linalg.det(axes)
+    flat, image = (points - centre) @ axes[:2].T, rays @ basis[:2].T
+    left, scales, right = np.linalg.svd(np.linalg.lstsq(flat, image - image.mean(axis=0), rcond=None)[0].T)
+    turn = np.eye(3)
+    turn[:2, :2] = left @ right
+    turn[2, 2] = np.linalg.det(left @ right)  # seen from behind, its normal comes towards the camera
+    R = basis.T @ turn @ axes
+    return _pose(R, sight / np.linalg.norm(sight) / scales.mean() - R @ centre)
 
 
 def _plane_pose(rays: Array, points: Array, centre: Array, axes: Array) -> Array:

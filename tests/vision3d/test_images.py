@@ -88,6 +88,16 @@ def test_what_is_no_picture_is_a_sentence(tmp_path, picture):
         read_image(tmp_path / "real.tiff")
 
 
+def test_telephones_and_raw_files_are_told_what_to_do(tmp_path, picture):
+    (tmp_path / "IMG_1.HEIC").write_bytes(b"\x00\x00\x00\x18ftypheic" + bytes(100))
+    with pytest.raises(FileFormatError, match="it is HEIC, as telephones write it; convert it"):
+        read_image(tmp_path / "IMG_1.HEIC")
+    tiff = write(tmp_path / "a.tiff", picture)
+    tiff.rename(tmp_path / "a.dng")
+    with pytest.raises(FileFormatError, match="raw data of a sensor"):
+        read_image(tmp_path / "a.dng")
+
+
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.95])
 def test_a_file_that_is_cut_off_is_told(tmp_path, picture, suffix, share):

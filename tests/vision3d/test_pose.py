@@ -9,6 +9,7 @@ from sequential.errors import DataError, NotFiniteError, ShapeError, UnderConstr
 from sequential.manifold import SE3
 from vision3d.camera import Camera
 from vision3d.pose import estimate_pose, estimate_poses, project_object, transform_points
+from vision3d.pose_start import frontal_pose
 
 every_camera = pytest.mark.parametrize("camera", EVERY_CAMERA, ids=lambda camera: camera.lens)
 BOARD = 0.025 * np.array([[x, y, 0.0] for y in range(6) for x in range(9)])
@@ -152,6 +153,32 @@ def test_both_poses_are_opencv_s(rng):
             assert np.linalg.norm(shift.ravel() - one.camera_T_object[4:]) < 0.02 * np.linalg.norm(shift)
             angle = cv2.Rodrigues(rotation_matrix_of(one.camera_T_object).T @ cv2.Rodrigues(turn)[0])[0]
             assert np.linalg.norm(angle) < 0.1
+
+
+def test_a_start_that_noise_cannot_spoil(rng):
+    """The frontal pose leads to the same minimum, from either side of a plane, however its axes lie."""
+    for camera in (camera_of("brown5"), camera_of("fisheye4")):
+        for name, points in OBJECTS.items():
+            for behind in (False, True):
+                truth = random_pose(rng, points, tilt=(0.1, 0.5))
+                if behind:  # about the middle of the object
+                    R, centre = rotation_matrix_of(truth) @ np.diag([1.0, -1.0, -1.0]), points.mean(axis=0)
+                    truth = np.concatenate([quaternion(R), transform_points(truth, centre) - R @ centre])
+                pixels = project_object(camera, truth, points)
+                start = frontal_pose(camera, points, pixels)
+                near = transform_points(start, points.mean(axis=0))
+                assert np.linalg.norm(near - transform_points(truth, points.mean(axis=0))) < 0.3, name
+                found = estimate_poses(camera, points, pixels, 0.1, start=start)[0]
+                assert found.rms_px < 4.0, name
+
+
+def test_a_dozen_pixels_of_noise_have_a_pose(rng):
+    camera = camera_of("brown5")
+    for _ in range(300):
+        truth = random_pose(rng, SQUARE, distance=(1.8, 2.5), tilt=(0.0, 1.4))
+        pixels = project_object(camera, truth, SQUARE) + 1.5 * rng.standard_normal((4, 2))
+        estimate = estimate_pose(camera, SQUARE, pixels, 1.5)
+        assert (transform_points(estimate.camera_T_object, SQUARE)[:, 2] > 0.0).all()
 
 
 def test_a_fisheye_sees_an_object_beside_itself(rng):
