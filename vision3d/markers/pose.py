@@ -27,7 +27,7 @@ from sequential.errors import DataError, ModelError, NotPositiveDefiniteError, S
 from sequential.manifold import SE3
 from sequential.manifold.quaternion import rotate
 from vision3d.markers.detection import Marker
-from vision3d.markers.flat_object import FlatModes, flat_modes
+from vision3d.markers.flat_object import FlatModes, flat_modes, flat_modes_of_many
 
 if TYPE_CHECKING:
     from vision3d.camera import Camera
@@ -152,20 +152,38 @@ def marker_pose(camera: Camera, corners: Array, size_m: float, sigma_px: float |
     return pose_of_modes(flat_modes(camera, points, own, _whitening(sigma_px)))
 
 
-def marker_poses(camera: Camera, markers: Sequence[Marker], size_m: float) -> tuple[MarkerPose, ...]:
-    """Poses of detected markers of one size, each from its corners and their covariance."""
-    return tuple(marker_pose(camera, one.corners, size_m, one.cov) for one in markers)
+def marker_poses(
+    camera: Camera, markers: Sequence[Marker], size_m: float | Sequence[float]
+) -> tuple[MarkerPose | None, ...]:
+    """Poses of detected markers, each from its corners and their covariance; None where there is none.
+
+    `size_m` is one size, or one for each.
+    """
+    if not markers:
+        return ()
+    sizes = np.broadcast_to(np.asarray(size_m, dtype=np.float64), (len(markers),))
+    corners = np.array([one.corners for one in markers])
+    factors = np.linalg.cholesky(np.array([one.cov for one in markers]))
+    # all at the size of one metre: places and their covariances scale
+    found = flat_modes_of_many(camera, marker_corners(1.0), corners, np.linalg.inv(factors)[:, None])
+    return tuple(
+        None if one is None else pose_of_modes(one, float(size))
+        for one, size in zip(found, sizes, strict=True)
+    )
 
 
-def pose_of_modes(found: FlatModes) -> MarkerPose:
-    """Order what the kernel found by probability."""
-    top = found.log_z.max()
-    weights = np.exp(found.log_z - top)
+def pose_of_modes(found: FlatModes, size: float = 1.0) -> MarkerPose:
+    """Order what the kernel found by probability, in units of `size` metres."""
+    weights = np.exp(found.log_z - found.log_z.max())
     weights /= weights.sum()
-    order = np.argsort(-weights, kind="stable")
+    scale = np.array([1.0, 1.0, 1.0, size, size, size])
+    covs, stretch = found.covs * np.outer(scale, scale), np.concatenate([np.ones(4), scale[3:]])
+    poses, minima = found.poses * stretch, found.minima * stretch
+    for array in (covs, poses, minima):
+        array.flags.writeable = False
     modes = tuple(
-        Mode(found.poses[k], found.covs[k], float(weights[k]), float(found.rms_px[k]), found.minima[k])
-        for k in order
+        Mode(poses[k], covs[k], float(weights[k]), float(found.rms_px[k]), minima[k])
+        for k in np.argsort(-weights, kind="stable")
     )
     return MarkerPose(modes, found.scale)
 
