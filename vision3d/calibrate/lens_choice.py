@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 CANDIDATES = ("pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "thin12", "fisheye4")
 """Lenses that are tried by default."""
-AS_GOOD = 1.01
+AS_GOOD = 1.005
 """Lenses whose held-out error is within this factor of the best are as good: the simplest of them wins."""
 MOST_FOLDS = 30
 """With more views, several are held out at a time."""
@@ -106,8 +106,8 @@ def choose_lens(
     Returns
     -------
     LensChoice
-        The simplest lens whose held-out error is within 1 % of the best of those that do not fold within the
-        image (of all, if all do).
+        The simplest lens whose held-out error is within 0.5 % of the best of those that do not fold within
+        the image (of all, if all do).
 
     Raises
     ------

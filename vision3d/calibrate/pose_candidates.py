@@ -39,15 +39,13 @@ def pose_candidates(camera: Camera, board: Board) -> tuple[Array, Mask]:
         (C, 7) camera_T_board, and which points of the board are in the image, (C, N).
     """
     poses = _laid_out(camera, board)
+    if not _known_by_part(board):
+        poses = poses[_inside(camera, camera.project(_placed(poses, board.outline))).all(axis=1)]
     pixels = camera.project(_placed(poses, board.points))
     seen = _inside(camera, pixels)
-    if _known_by_part(board):
-        enough = seen.mean(axis=1) >= LEAST_SEEN
-    else:
-        enough = seen.all(axis=1) & _inside(camera, camera.project(_placed(poses, board.outline))).all(axis=1)
-    poses, seen, pixels = poses[enough], seen[enough], pixels[enough]
-    wide = _pitch(board, pixels) >= LEAST_PITCH_PX
-    return poses[wide], seen[wide]
+    good = seen.mean(axis=1) >= (LEAST_SEEN if _known_by_part(board) else 1.0)
+    good &= _pitch(board, pixels) >= LEAST_PITCH_PX
+    return poses[good], seen[good]
 
 
 def _laid_out(camera: Camera, board: Board) -> Array:
