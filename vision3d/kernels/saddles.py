@@ -18,11 +18,11 @@ import numba
 import numpy as np
 
 from vision3d.kernels import inlined, kernel
+from vision3d.kernels.window_fit import covariance, fit_window
 
 __all__ = ["fit_saddles"]
 
 P = 9
-ITERATIONS = 50
 SHARPEST, BLURRED = 0.45, 8.0  # px; below the first, pixels beside an edge say nothing of where it is
 ROOT2 = math.sqrt(2.0)
 
@@ -59,37 +59,6 @@ def _model(q, b1, b2, x, y, row):
 
 
 @inlined
-def _factor(A, L):
-    """Cholesky factor of a P x P matrix; False where it is not positive definite."""
-    for i in range(P):
-        for j in range(i + 1):
-            total = A[i, j]
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            if i == j:
-                if not total > 0.0:
-                    return False
-                L[i, i] = math.sqrt(total)
-            else:
-                L[i, j] = total / L[j, j]
-    return True
-
-
-@inlined
-def _solve(L, g, x):
-    for i in range(P):
-        total = g[i]
-        for k in range(i):
-            total -= L[i, k] * x[k]
-        x[i] = total / L[i, i]
-    for i in range(P - 1, -1, -1):
-        total = x[i]
-        for k in range(i + 1, P):
-            total -= L[k, i] * x[k]
-        x[i] = total / L[i, i]
-
-
-@inlined
 def _inside(u, v, axes, half, inset, reach):
     """Whether an offset lies in the parallelogram of half-width `half`, in its cross, and in the circle."""
     if u * u + v * v > reach * reach:
@@ -114,42 +83,6 @@ def _gather(image, cx, cy, axes, half, inset, reach, px, py, value):
                 px[n], py[n], value[n] = x, y, image[y, x]
                 n += 1
     return n
-
-
-@inlined
-def _cost(q, b1, b2, n, px, py, value, row):
-    total = 0.0
-    for i in range(n):
-        r = value[i] - _model(q, b1, b2, px[i], py[i], row)
-        total += r * r
-    return total
-
-
-@inlined
-def _normal(q, b1, b2, n, px, py, value, row, A, g):
-    """Fill the normal equations A = JᵀJ, g = Jᵀr."""
-    for i in range(P):
-        g[i] = 0.0
-        for j in range(P):
-            A[i, j] = 0.0
-    for k in range(n):
-        r = value[k] - _model(q, b1, b2, px[k], py[k], row)
-        for i in range(P):
-            g[i] += row[i] * r
-            for j in range(i + 1):
-                A[i, j] += row[i] * row[j]
-
-
-@inlined
-def _hold(k, A, g):
-    """Keep a parameter where it is: at a bound it would drag the others along."""
-    for i in range(P):
-        if i > k:
-            A[i, k] = 0.0
-        else:
-            A[k, i] = 0.0
-    A[k, k] = 1.0
-    g[k] = 0.0
 
 
 @inlined
@@ -205,7 +138,7 @@ def fit_saddles(image, starts, axes, bends, half, inset, reach, corners, covs, f
     """
     size = (2 * math.ceil(reach) + 3) ** 2
     px, py, value = np.empty(size), np.empty(size), np.empty(size)
-    q, tried, row, g, step = np.empty(P), np.empty(P), np.empty(P), np.empty(P), np.empty(P)
+    q, work = np.empty(P), np.empty((4, P))
     A, D, L = np.empty((P, P)), np.empty((P, P)), np.zeros((P, P))
     for c in range(len(starts)):
         corners[c, :] = np.nan
@@ -218,57 +151,12 @@ def fit_saddles(image, starts, axes, bends, half, inset, reach, corners, covs, f
         if n < 2 * P:
             continue
         _start(q, cx, cy, axes[c], n, px, py, value)
-        cost = _cost(q, b1, b2, n, px, py, value, row)
-        damping, alive, settled = 1e-3, True, False
-        for _ in range(ITERATIONS):
-            _normal(q, b1, b2, n, px, py, value, row, A, g)
-            if q[4] <= SHARPEST and g[4] < 0.0:
-                _hold(4, A, g)
-            for i in range(P):
-                for j in range(i + 1):
-                    D[i, j] = A[i, j]
-                D[i, i] = A[i, i] * (1.0 + damping) + 1e-12
-            if not _factor(D, L):
-                alive = False
-                break
-            _solve(L, g, step)
-            for i in range(P):
-                tried[i] = q[i] + step[i]
-            tried[4] = min(max(tried[4], SHARPEST), BLURRED)
-            new = _cost(tried, b1, b2, n, px, py, value, row)
-            if new <= cost:
-                for i in range(P):
-                    q[i] = tried[i]
-                gain = cost - new
-                cost = new
-                damping = max(damping * 0.2, 1e-6)
-                if gain <= 1e-7 * cost + 1e-9 and abs(step[0]) + abs(step[1]) < 1e-3:
-                    settled = True
-                    break
-            else:
-                damping *= 8.0
-                if damping > 1e6:
-                    settled = True
-                    break
-            if math.hypot(q[0] - cx, q[1] - cy) > reach:
-                alive = False
-                break
-        if not (alive and settled):
-            continue
-        _normal(q, b1, b2, n, px, py, value, row, A, g)
-        if q[4] <= SHARPEST:
-            _hold(4, A, g)
-        if not _factor(A, L):
+        cost = fit_window(_model, q, b1, b2, n, px, py, value, 4, SHARPEST, BLURRED, reach, work, A, D, L)
+        if cost < 0.0:
             continue
         variance = cost / (n - P)
-        for axis in range(2):
-            for i in range(P):
-                g[i] = 0.0
-            g[axis] = variance
-            _solve(L, g, step)
-            covs[c, axis] = step[axis] if axis == 0 else step[0]
-            covs[c, 2] = step[1]
-        _solve(L, g, step)
+        if not covariance(_model, q, b1, b2, n, px, py, value, 4, SHARPEST, variance, work, A, L, covs[c]):
+            continue
         corners[c, 0], corners[c, 1] = q[0], q[1]
         facts[c, 0] = math.sqrt(variance)
         facts[c, 1] = q[6]

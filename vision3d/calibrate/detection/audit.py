@@ -17,6 +17,8 @@ __all__ = ["audited"]
 STRANGE, STRANGE_PX = 5.0, 0.25
 """Standard deviations and pixels beyond which a residual is no chance."""
 CARRIED_PX = 0.5
+JUDGED_FROM = 6
+"""Points from which a view says anything about its own scatter."""
 SOFT_PX, FAINT = 3.0, 12.0
 
 
@@ -40,7 +42,7 @@ def audited(
         forced = refine_corners(grey, pixels, window, iterations=60)
         moved = _moved(ids, forced - pixels, sigma)
         pixels, reach = forced, np.full(len(ids), float(window))
-    smooth = fit_smooth(points, pixels, size)
+    smooth = fit_smooth(points, pixels, size) if len(ids) >= JUDGED_FROM else None
     noise = float(np.sqrt(np.mean(sigma**2)))
     extra, residuals, scatter = 0.0, np.empty((0, 2)), float("nan")
     strange: tuple[int, ...] = ()

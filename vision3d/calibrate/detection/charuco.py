@@ -42,8 +42,8 @@ def find_charuco(grey: Grey, board: CharucoBoard) -> Found | NotFound:
     notes: tuple[str, ...] = ()
     if errors[1] < 0.5 * errors[0] and errors[0] > 0.05:
         board, errors = other, errors[::-1]
-        word, flag = ("legacy pattern", "legacy") if other.legacy else ("newer pattern", "no-legacy")
-        notes = (f"the board has the {word}, and was read as such: say so with --{flag}",)
+        word = "legacy pattern (OpenCV before 4.6)" if other.legacy else "pattern of OpenCV 4.6 and later"
+        notes = (f"the board has the {word}, and was read as such",)
     if errors[0] > ASTRAY:
         if said := _mirrored(grey, board.dictionary, len(numbers)):
             return NotFound(reason=said)

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from vision3d.boards import Checkerboard
 from vision3d.calibrate.detection.found import Found, NotFound
-from vision3d.calibrate.detection.grid_growth import Grid, find_grids
+from vision3d.calibrate.detection.grid_growth import find_grids
 from vision3d.calibrate.detection.lattice import Array
+from vision3d.calibrate.detection.lattice_growth import Grid
 from vision3d.calibrate.detection.ordering import Cells, dark_first, laid_out, parity_sign, turned_towards
 from vision3d.calibrate.detection.refine import refine_saddles
 

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError, ShapeError
-from vision3d.boards import Board, CharucoBoard, Checkerboard, MarkerBoard
+from vision3d.boards import Board, CharucoBoard, Checkerboard, CircleGrid, MarkerBoard
 from vision3d.calibrate.detection.audit import audited
 from vision3d.calibrate.detection.charuco import find_charuco, find_marker_board
 from vision3d.calibrate.detection.checkerboards import find_checkerboard
+from vision3d.calibrate.detection.circles import find_circle_grid
 from vision3d.calibrate.detection.found import Found, NotFound
 from vision3d.views import Detections, Missed, View, ViewAudit
 
@@ -113,6 +114,8 @@ def _find(grey: NDArray[np.uint8], board: Board) -> Found | NotFound:
         return find_charuco(grey, board)
     if isinstance(board, MarkerBoard):
         return find_marker_board(grey, board)
+    if isinstance(board, CircleGrid):
+        return find_circle_grid(grey, board)
     raise ModelError(f"a {board.kind} board cannot be looked for here")
 
 
@@ -140,6 +143,11 @@ def _reason(board: Board, seen: tuple[int, int] | None) -> str:
     if seen is None:
         return f"no {board.name} found: the whole board must be in the image, sharp, and lit without glare"
     columns, rows = seen
+    if isinstance(board, CircleGrid):
+        return (
+            f"no {board.name} found; I see {columns}x{rows} circles: either the size of the grid is not "
+            "what was given, or a part of it is hidden or cut off"
+        )
     wanted = tuple(sorted(board.shape, reverse=True))
     if (columns + 1, rows + 1) == wanted:
         return (
@@ -162,9 +170,10 @@ def _findings(
     sizes = Counter(one.seen for one in missed if one.seen is not None)
     if sizes and not seen:
         (columns, rows), times = sizes.most_common(1)[0]
+        things = "circles" if isinstance(board, CircleGrid) else "inner corners"
         if times >= max(2, len(missed) // 3) or len(missed) == times:
             said.append(
-                f"{times} of {len(missed)} images show {columns}x{rows} inner corners where {board.name} was "
+                f"{times} of {len(missed)} images show {columns}x{rows} {things} where a {board.name} was "
                 f"expected: try --board {columns}x{rows}"
             )
     if isinstance(board, Checkerboard) and board.half_turn is not None and seen:

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Grid", "find_grids"]
+from vision3d.calibrate.detection.lattice_growth import STEPS, Cell, Grid, grid_of_cells, grow, near
+
+__all__ = ["find_grids"]
 
 Array = NDArray[np.float64]
 
@@ -23,48 +25,9 @@ SYMMETRY = 0.35
 """Share of the ring's light that may differ between opposite points."""
 LEAST = 0.06
 """Response of a candidate relative to the strongest."""
-CATCH = 0.25
-"""How far from its prediction a corner is looked for, in spacings."""
 SMALLEST = 9
 ALIKE = 0.6
 """Cosine of how far a phase may be from that of its neighbours."""
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """Corners on a lattice: pixels (N, 2), cells (N, 2) column and row counted from 0."""
-
-    pixels: Array
-    cells: NDArray[np.int64]
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Columns and rows that the corners span."""
-        columns, rows = self.cells.max(axis=0) + 1
-        return int(columns), int(rows)
-
-    @property
-    def whole(self) -> bool:
-        """Whether no place is empty."""
-        columns, rows = self.shape
-        return len(self.cells) == columns * rows
-
-    def trimmed(self, least: float = 0.5) -> Grid:
-        """The grid without the rows and columns at its rim of which less than a share is there."""
-        cells, pixels = self.cells, self.pixels
-        while len(cells):
-            low, high = cells.min(axis=0), cells.max(axis=0)
-            ends = [(axis, int(end)) for axis in (0, 1) for end in (low[axis], high[axis])]
-            shares = [
-                np.sum(cells[:, axis] == end) / (high[1 - axis] - low[1 - axis] + 1.0) for axis, end in ends
-            ]
-            worst = int(np.argmin(shares))
-            if shares[worst] >= least:
-                break
-            axis, end = ends[worst]
-            keep = cells[:, axis] != end
-            cells, pixels = cells[keep], pixels[keep]
-        return Grid(pixels, cells - cells.min(axis=0)) if len(cells) else self
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +60,9 @@ def find_grids(grey: NDArray[np.uint8], blur_px: float = 1.5) -> list[Grid]:
         if not free[seed] or len(grids) >= SEEDS:
             continue
         cells = _grow(candidates, int(seed), free)
-        free[seed] = False
         if len(cells) >= SMALLEST:
             free[list(cells.values())] = False
-            grids.append(_grid(candidates, cells))
+            grids.append(grid_of_cells(candidates.pixels, cells))
     return sorted(grids, key=lambda grid: -len(grid.cells))
 
 
@@ -177,10 +139,7 @@ def _sample(image: NDArray[np.float32], places: Array) -> Array:
     return mixed
 
 
-STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
-
-
-def _grow(c: Candidates, seed: int, free: NDArray[np.bool_]) -> dict[tuple[int, int], int]:
+def _grow(c: Candidates, seed: int, free: NDArray[np.bool_]) -> dict[Cell, int]:
     """Cells of the lattice that grows from a candidate: cell to candidate."""
     cells = {(0, 0): seed}
     for step, direction in zip(STEPS, (*c.edges[seed], *-c.edges[seed]), strict=True):
@@ -189,30 +148,17 @@ def _grow(c: Candidates, seed: int, free: NDArray[np.bool_]) -> dict[tuple[int, 
             cells[step] = found
     if len(cells) < 3:
         return {}
-    taken = set(cells.values())
-    refused: dict[tuple[int, int], int] = {}
-    growing = True
-    while growing:
-        growing = False
-        rim = {(i + a, j + b) for i, j in cells for a, b in STEPS} - cells.keys()
-        for cell in sorted(rim, key=lambda one: (abs(one[0]) + abs(one[1]), one)):
-            if refused.get(cell) == len(_near(cells, cell)):
-                continue
-            guess = _predict(c, cells, cell)
-            hit = -1 if guess is None else _catch(c, guess[0], guess[1], free, taken)
-            if hit >= 0 and _agrees(c, np.array([hit]), _expected(c, cells, cell))[0]:
-                cells[cell] = hit
-                taken.add(hit)
-                growing = True
-            else:
-                refused[cell] = len(_near(cells, cell))
-    return cells
+
+    def agrees(candidate: int, cell: Cell, so_far: dict[Cell, int]) -> bool:
+        return bool(_agrees(c, np.array([candidate]), _expected(c, so_far, cell))[0])
+
+    return grow(c.pixels, cells, free, agrees)
 
 
-def _expected(c: Candidates, cells: dict[tuple[int, int], int], cell: tuple[int, int]) -> complex:
+def _expected(c: Candidates, cells: dict[Cell, int], cell: Cell) -> complex:
     """Phase of a cell by the cells around it, each turned as often as it is away."""
     i, j = cell
-    signed = [(-1) ** (i - a + j - b) * c.phase[cells[a, b]] for a, b in _near(cells, cell)]
+    signed = [(-1) ** (i - a + j - b) * c.phase[cells[a, b]] for a, b in near(cells, cell)]
     return complex(np.mean(signed))
 
 
@@ -227,12 +173,6 @@ def _agrees(c: Candidates, which: NDArray[np.int64], expected: complex) -> NDArr
     return agreed
 
 
-def _near(cells: dict[tuple[int, int], int], cell: tuple[int, int]) -> list[tuple[int, int]]:
-    """Known cells within two steps."""
-    i, j = cell
-    return [(i + a, j + b) for a in range(-2, 3) for b in range(-2, 3) if (i + a, j + b) in cells]
-
-
 def _first(c: Candidates, seed: int, direction: Array, free: NDArray[np.bool_]) -> int:
     """The nearest candidate along an edge of the seed with an edge of the same direction; -1 for none."""
     offset = c.pixels - c.pixels[seed]
@@ -244,48 +184,3 @@ def _first(c: Candidates, seed: int, direction: Array, free: NDArray[np.bool_]) 
     if not good.any():
         return -1
     return int(np.flatnonzero(good)[np.argmin(along[good])])
-
-
-def _predict(
-    c: Candidates, cells: dict[tuple[int, int], int], cell: tuple[int, int]
-) -> tuple[Array, float] | None:
-    """Where a cell should be by its neighbours, and the spacing there; None where they say nothing."""
-    i, j = cell
-    guesses, spacings = [], []
-    at = c.pixels
-    for a, b in STEPS:
-        one, two, three = (i + a, j + b), (i + 2 * a, j + 2 * b), (i + 3 * a, j + 3 * b)
-        if one in cells and two in cells:
-            step = at[cells[one]] - at[cells[two]]
-            if three in cells:
-                before = at[cells[two]] - at[cells[three]]
-                step = step * min(max(float(np.linalg.norm(step) / np.linalg.norm(before)), 0.7), 1.4)
-            guesses.append(at[cells[one]] + step)
-            spacings.append(float(np.linalg.norm(step)))
-        for p, q in (((b, a)), ((-b, -a))):
-            side, corner = (i + p, j + q), (i + a + p, j + b + q)
-            if one in cells and side in cells and corner in cells:
-                guesses.append(at[cells[one]] + at[cells[side]] - at[cells[corner]])
-                spacings.append(
-                    min(
-                        float(np.linalg.norm(at[cells[one]] - at[cells[corner]])),
-                        float(np.linalg.norm(at[cells[side]] - at[cells[corner]])),
-                    )
-                )
-    if not guesses:
-        return None
-    return np.median(guesses, axis=0), min(spacings)
-
-
-def _catch(c: Candidates, guess: Array, spacing: float, free: NDArray[np.bool_], taken: set[int]) -> int:
-    """The candidate nearest to a prediction, if it is near enough and nobody's; -1 otherwise."""
-    distance = np.linalg.norm(c.pixels - guess, axis=1)
-    distance[~free] = np.inf
-    best = int(np.argmin(distance))
-    return best if distance[best] <= CATCH * spacing + 0.5 and best not in taken else -1
-
-
-def _grid(c: Candidates, cells: dict[tuple[int, int], int]) -> Grid:
-    places = np.array(list(cells), dtype=np.int64)
-    pixels = c.pixels[list(cells.values())]
-    return Grid(pixels, places - places.min(axis=0))

@@ -16,8 +16,8 @@ from vision3d.calibrate.detection.lattice import Array
 
 __all__ = ["Smooth", "fit_smooth"]
 
-RADIAL_FROM, PLAIN_FROM = 20, 6
-"""Points from which the distortion is fitted as well, and from which anything is."""
+RADIAL_FROM = 20
+"""Points from which the distortion is fitted as well."""
 PLAIN_STEPS, STEPS = 12, 24
 """Least squares to its end first: points that a half-way model cannot explain would lose their weight."""
 MOST_FREE = 0.9
@@ -34,19 +34,33 @@ class Smooth:
     residuals : (N, 2) px
     leverage : (N,) between 0 (the point decides nothing) and 1 (the fit follows it)
     scale_px : standard deviation of a coordinate, from the middle of the residuals
+    parameters, origin, unit, middle, radius : of the model, for `at`
     """
 
     residuals: Array
     leverage: Array
     scale_px: float
+    parameters: Array
+    origin: Array
+    unit: float
+    middle: Array
+    radius: float
+
+    def at(self, plane: Array) -> Array:
+        """Where the model puts points (N, 2) of the board's plane, (N, 2) px."""
+        xy = (plane - self.origin) / self.unit
+        r, _ = _linearise(self.parameters, xy, np.zeros_like(xy), 8)
+        return self.middle - r * self.radius
 
 
 def fit_smooth(points: Array, pixels: Array, size: tuple[int, int]) -> Smooth | None:
-    """Fit the model to points (N, 3) m and pixels (N, 2); None where there are too few points."""
+    """Fit the model to points (N, 3) m and pixels (N, 2); None for fewer than four."""
     n = len(pixels)
-    if n < PLAIN_FROM:
+    if n < 4:
         return None
-    flat = _centred(points[:, :2])
+    origin = points[:, :2].mean(axis=0)
+    unit = max(float(np.abs(points[:, :2] - origin).max()), 1e-12)
+    flat = (points[:, :2] - origin) / unit
     middle, radius = 0.5 * (np.array(size, dtype=np.float64) - 1.0), 0.5 * float(np.hypot(*size))
     target = (pixels - middle) / radius
     free = 13 if n >= RADIAL_FROM else 8
@@ -67,13 +81,9 @@ def fit_smooth(points: Array, pixels: Array, size: tuple[int, int]) -> Smooth | 
     r, J = _linearise(q, flat, target, free)
     inverse = np.linalg.pinv(np.einsum("n,nik,nil->kl", weights, J, J) + np.diag(prior), rcond=1e-14)
     hat = np.einsum("n,nik,kl,nil->n", weights, J, inverse, J) / 2.0
-    return Smooth(r * radius, np.clip(hat, 0.0, MOST_FREE), _scale(r, n, free) * radius)
-
-
-def _centred(xy: Array) -> Array:
-    moved = xy - xy.mean(axis=0)
-    scaled: Array = moved / max(float(np.abs(moved).max()), 1e-12)
-    return scaled
+    return Smooth(
+        r * radius, np.clip(hat, 0.0, MOST_FREE), _scale(r, n, free) * radius, q, origin, unit, middle, radius
+    )
 
 
 def _homography(xy: Array, target: Array) -> Array:
