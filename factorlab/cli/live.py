@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from factorlab.cli.faults import DATA_ERROR, in_one_sentence
-from factorlab.cli.settings import as_json, config_option, print_json
+from factorlab.cli.settings import as_json, command_line, config_option, print_json
+
+if TYPE_CHECKING:
+    from factorlab.live.camera import TaskSettings
+    from vision3d.frames import FrameSource
 
 __all__ = ["live"]
 
-TASKS = ("markers", "features")
+TASKS = ("markers", "calibrate", "line", "features")
+KINDS = ("checkerboard", "charuco", "circles", "acircles")
 PORT = 8090
 
 
@@ -24,7 +29,22 @@ def live() -> None:
 @live.command(name="camera", short_help="Markers, calibration, a line or features.")
 @click.argument("source", metavar="[SOURCE]", default="0")
 @click.option("--task", type=click.Choice(TASKS), default="markers", show_default=True, help="To begin with.")
+@click.option(
+    "--camera",
+    "model",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Model of the camera, with which markers have poses: OpenCV, ROS, Kalibr, COLMAP or ours.",
+)
+@click.option("--size", default="50mm", show_default=True, metavar="LENGTH", help="Side of the markers.")
 @click.option("--dictionary", default="auto", show_default=True, help="Of the markers.")
+@click.option(
+    "--board", default="9x6", show_default=True, metavar="COLSxROWS", help="As `factorlab calibrate camera`."
+)
+@click.option("--square", default="25mm", show_default=True, metavar="LENGTH", help="Side of its squares.")
+@click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True, help="Of board.")
+@click.option("--marker", metavar="LENGTH", help="Side of the markers of a ChArUco board.")
+@click.option("--lens", default="auto", show_default=True, help="Lens model of a calibration.")
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Of the page; 0: any free."
 )
@@ -52,14 +72,15 @@ def camera(source: str, **options: Any) -> int:
     recorded is complete.  With --json the summary of the session is printed at the end.
     """
     from factorlab.cli.stopping import stopping
-    from factorlab.live.camera import CameraSession, PageServer, TaskSettings, summary_of, task_choices
+    from factorlab.live.camera import CameraSession, PageServer, summary_of, task_choices
     from vision3d.frames import open_frames
 
+    settings = _settings(options)
     frames = open_frames(source, loop=options["loop"], fps=options["fps"])
+    require_size(settings, frames)
     session = CameraSession(
-        frames, task_choices(TaskSettings(options["dictionary"])), options["task"],
-        recordings=options["record"] or Path("recordings"), fast=options["fast"],
-    )  # fmt: skip
+        frames, task_choices(settings), options["task"], recordings=settings.folder, fast=options["fast"]
+    )
     with stopping() as stop:
         server = PageServer(session, options["port"])
         try:
@@ -80,6 +101,44 @@ def camera(source: str, **options: Any) -> int:
     return _told(summary, quiet=options["as_json"])
 
 
+def _settings(options: dict[str, Any]) -> TaskSettings:
+    """What the tasks need to know; what is wrong with the board's options is the command line's fault."""
+    from factorlab.live.camera import TaskSettings
+    from sequential.errors import ModelError
+    from vision3d.boards import board_from_text, metres
+    from vision3d.camera_files import read_camera
+
+    dictionary = options["dictionary"]
+    try:
+        marker_m = metres(options["size"], "size of a marker")
+        board = board_from_text(
+            options["board"], kind=options["kind"], square=options["square"], marker=options["marker"],
+            dictionary="4x4_50" if dictionary == "auto" else dictionary,
+        )  # fmt: skip
+    except ModelError as error:
+        raise click.UsageError(str(error)) from error
+    return TaskSettings(
+        camera=None if options["model"] is None else read_camera(options["model"]),
+        marker_m=marker_m,
+        dictionary=dictionary,
+        board=board,
+        lens=options["lens"],
+        folder=options["record"] or Path("recordings"),
+        command=command_line(),
+    )
+
+
+def require_size(settings: TaskSettings, frames: FrameSource) -> None:
+    """Raise where the camera model belongs to images of another size than those that come."""
+    from sequential.errors import DataError
+
+    if settings.camera is not None and settings.camera.size != frames.size:
+        model, there = ("x".join(map(str, size)) for size in (settings.camera.size, frames.size))
+        raise DataError(
+            f"the camera model is for {model} images, {frames.name} gives {there}; calibrate at that size"
+        )
+
+
 def _told(summary: dict[str, Any], *, quiet: bool) -> int:
     """Say how it ended."""
     if not quiet:
@@ -87,6 +146,11 @@ def _told(summary: dict[str, Any], *, quiet: bool) -> int:
     for one in summary["recordings"]:
         lost = f", {one['lost']} lost: the disk is too slow" if one["lost"] else ""
         click.echo(f"recorded: {one['frames']} frames in {one['folder']}{lost}", err=True)
+    calibration = summary["tasks"].get("calibrate", {})
+    if calibration.get("pictures") and not calibration["saved"]:
+        click.echo(f"pictures of the board: {calibration['pictures']}", err=True)
+    elif calibration.get("saved"):
+        click.echo(f"calibration: {calibration['saved']}", err=True)
     for sentence in summary["left_out"]:
         click.echo(f"warn: {sentence}", err=True)
     faults = [summary["fault"], *(one["fault"] for one in summary["recordings"])]

@@ -82,7 +82,8 @@ class CameraSession:
         self._task = self.tasks[task] = self._made(task)
         self._watchers = self._done = 0  # clients that want pictures; frames worked on
         self._recording: Recording | None = None
-        self._lap, self._redraw, self._stop = 1, threading.Event(), threading.Event()
+        self._lap, self._version = 1, 0
+        self._redraw, self._read_again, self._stop = threading.Event(), threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="task", daemon=True)
 
     def start(self) -> None:
@@ -120,7 +121,7 @@ class CameraSession:
             self.tasks[name] = made
             self._task, self.message = self.tasks[name], ""
             self._task.restart()
-        self._redraw.set()
+        self._read_again.set()
 
     def _made(self, name: str) -> Task:
         task = self.choices[name].make()
@@ -130,7 +131,7 @@ class CameraSession:
     def act(self, action: str) -> None:
         """Press a button of the task."""
         self.message = self._task.act(action)
-        self._redraw.set()
+        self._read_again.set()
 
     def show_marks(self, *, on: bool) -> None:
         """Draw marks on the picture, or leave it as it came."""
@@ -216,18 +217,20 @@ class CameraSession:
                 number, captured = taken
                 self._work(captured, skipped=number - self._done - 1)
                 self._done = number
-            elif self._redraw.is_set():
+            elif self._redraw.is_set() or self._read_again.is_set() or self._task.version != self._version:
                 self._show_again()
             elif self.ended:
                 self.stop_recording()
 
     def _work(self, captured: Captured, *, skipped: int) -> None:
         self._redraw.clear()
+        self._read_again.clear()
         with self._lock:
             task, recording = self._task, self._recording
         if self.reader.laps != self._lap:
             self._lap = self.reader.laps
             task.restart()
+        self._version = task.version
         began = time.monotonic_ns()
         reading = _read(task, captured)
         ended = time.monotonic_ns()
@@ -238,11 +241,15 @@ class CameraSession:
 
     def _show_again(self) -> None:
         """The frame that stands still, as the task or the switch that was changed sees it."""
+        task = self._task
+        changed = self._read_again.is_set() or task.version != self._version
         self._redraw.clear()
+        self._read_again.clear()
+        self._version = task.version
         if (newest := self.shown.take(0, 0.0)) is None:
             return
-        shown, task = newest[1], self._task
-        reading = shown.reading if shown.task == task.name else _read(task, shown.captured)
+        shown = newest[1]
+        reading = _read(task, shown.captured) if changed else shown.reading
         self.shown.put(
             replace(shown, task=task.name, reading=reading, jpeg=self._picture(shown.captured, reading))
         )

@@ -24,6 +24,11 @@ class Task(ABC):
     columns: ClassVar[tuple[str, ...]]  # of the CSV, after frame and t_s
 
     @property
+    def version(self) -> int:
+        """Counts what changes without a frame, such as work that goes on behind the task."""
+        return 0
+
+    @property
     def actions(self) -> tuple[Action, ...]:
         """Buttons of the page for this task."""
         return ()
@@ -33,7 +38,7 @@ class Task(ABC):
 
     @abstractmethod
     def read(self, frame: Frame) -> Reading:
-        """What is seen in this frame."""
+        """What is seen in this frame; one that stands still may come again, when something has changed."""
 
     def act(self, action: str) -> str:
         """Do what a button says; returns a sentence for the page.

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from factorlab.live.camera.session import TaskChoice
 from factorlab.live.camera.task import Task
 
+if TYPE_CHECKING:
+    from vision3d.boards import Board
+    from vision3d.camera import Camera
+    from vision3d.lines import LineSettings
+
 __all__ = ["TASKS", "TaskSettings", "task_choices"]
 
-TASKS = {"markers": "Markers", "features": "Features"}
+TASKS = {"markers": "Markers", "calibrate": "Calibrate", "line": "Line", "features": "Features"}
 
 
 @dataclass(frozen=True)
@@ -18,10 +25,23 @@ class TaskSettings:
 
     Parameters
     ----------
+    camera : its model, with which markers have poses
+    marker_m : side of the markers' black squares
     dictionary : of the markers
+    board, lens : of a calibration; no board: a checkerboard of 9x6 inner corners and squares of 25 mm
+    line : where a line may be, and what it looks like
+    folder : calibrations are saved in folders of their own in it
+    command : stands in reports
     """
 
+    camera: Camera | None = None
+    marker_m: float = 0.05
     dictionary: str = "auto"
+    board: Board | None = None
+    lens: str = "auto"
+    line: LineSettings | None = None
+    folder: Path = field(default=Path("recordings"))
+    command: str = ""
 
 
 def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
@@ -32,10 +52,22 @@ def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
 
         return MarkersTask(settings.dictionary)
 
+    def calibrate() -> Task:
+        from factorlab.live.camera.tasks.calibrate import CalibrateTask
+        from vision3d.boards import Checkerboard
+
+        board = settings.board or Checkerboard(9, 6, 0.025)
+        return CalibrateTask(board, settings.lens, settings.folder, settings.command)
+
+    def line() -> Task:
+        from factorlab.live.camera.tasks.line import LineTask
+
+        return LineTask(settings.line)
+
     def features() -> Task:
         from factorlab.live.camera.tasks.features import FeaturesTask
 
         return FeaturesTask()
 
-    makers = {"markers": markers, "features": features}
+    makers = {"markers": markers, "calibrate": calibrate, "line": line, "features": features}
     return tuple(TaskChoice(name, title, makers[name]) for name, title in TASKS.items())
