@@ -6,6 +6,7 @@
 ...     pose.camera_T_marker, pose.odds, pose.certain
 """
 
+from vision3d.markers.boards import BoardPose, board_pose, find_board_pose, marker_board_pose
 from vision3d.markers.detection import Marker, detect_markers, find_markers
 from vision3d.markers.hypothesis import MarkerMotion
 from vision3d.markers.pose import CERTAIN, MarkerPose, Mode, marker_corners, marker_pose, marker_poses
@@ -13,14 +14,18 @@ from vision3d.markers.tracking import MarkerTracker, TrackedMarker
 
 __all__ = [
     "CERTAIN",
+    "BoardPose",
     "Marker",
     "MarkerMotion",
     "MarkerPose",
     "MarkerTracker",
     "Mode",
     "TrackedMarker",
+    "board_pose",
     "detect_markers",
+    "find_board_pose",
     "find_markers",
+    "marker_board_pose",
     "marker_corners",
     "marker_pose",
     "marker_poses",
