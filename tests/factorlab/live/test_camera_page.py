@@ -42,7 +42,7 @@ def test_buttons_do_what_they_say(window, live, marker_video):
     window.click("#record")
     window.until("recording.textContent.includes(' frames, ')")
     assert session.recorded[0].frames > 3
-    window.click("#tasks button:nth-child(2)")
+    window.click("#tasks button:nth-child(4)")
     window.until("document.body.dataset.task === 'features' && headline.textContent.endsWith('corners')")
 
 
