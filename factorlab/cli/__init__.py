@@ -7,6 +7,7 @@ import click
 
 from factorlab.cli.attitude import attitude
 from factorlab.cli.calibrate import calibrate
+from factorlab.cli.camera import camera
 from factorlab.cli.characterize import characterize
 from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
@@ -56,6 +57,7 @@ for command in (
     firmware,
     record,
     live,
+    camera,
     undistort,
     info,
     doctor,
