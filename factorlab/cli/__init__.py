@@ -15,6 +15,7 @@ from factorlab.cli.doctor import doctor
 from factorlab.cli.firmware import firmware
 from factorlab.cli.info import info
 from factorlab.cli.live import live
+from factorlab.cli.objects import objects
 from factorlab.cli.record import record
 from factorlab.cli.tune import tune
 from factorlab.cli.undistort import undistort
@@ -59,6 +60,7 @@ for command in (
     live,
     camera,
     undistort,
+    objects,
     info,
     doctor,
 ):

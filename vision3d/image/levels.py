@@ -31,12 +31,9 @@ def histogram(image: ArrayLike, *, backend: Backend = "compiled") -> NDArray[np.
     """(256,) counts of the levels of a grey image of bytes."""
     pixels = as_bytes(image)
     if checked_backend(backend) == "opencv":
-        import cv2
+        from vision3d.cv import calc_hist
 
-        counts: NDArray[np.int64] = np.rint(cv2.calcHist([pixels], [0], None, [256], [0, 256])).astype(
-            np.int64
-        )
-        return counts.ravel()
+        return np.rint(calc_hist(pixels)).astype(np.int64)
     if backend == "numpy":
         return np.bincount(pixels.ravel(), minlength=256).astype(np.int64)
     from vision3d.kernels import image_levels
@@ -64,7 +61,14 @@ def equalise(image: ArrayLike, *, backend: Backend = "compiled") -> NDArray[np.u
     below = counts.cumsum() - counts[: darkest + 1].sum()
     table = saturate(below.astype(np.float32) * (np.float32(255.0) / np.float32(rest)), np.uint8)
     table[: darkest + 1] = 0
-    equalised: NDArray[np.uint8] = table[pixels]
+    equalised: NDArray[np.uint8]
+    if backend == "numpy":
+        equalised = table[pixels]
+        return equalised
+    from vision3d.kernels import image_levels
+
+    equalised = np.empty(pixels.shape, np.uint8)
+    image_levels.look_up(pixels, table, equalised)
     return equalised
 
 

@@ -115,7 +115,7 @@ def saturate(values: NDArray[Any], dtype: DTypeLike) -> Image:
     This is OpenCV's `saturate_cast`: 255.5 and 300 become 255 in uint8, -3 becomes 0, 2.5 becomes 2.
     """
     kind = np.dtype(dtype)
-    if kind.kind == "f":
+    if kind == values.dtype or kind.kind == "f":
         return values.astype(kind, copy=False)
     limits = np.iinfo(kind)
     if values.dtype.kind == "f":

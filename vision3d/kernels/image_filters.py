@@ -42,57 +42,52 @@ def correlate(padded, taps, out):
     ]
 )
 def separable(padded, along_x, along_y, out):
-    """The same for taps[j, i] = along_y[j] · along_x[i]: rows first, then columns."""
+    """The same for taps[j, i] = along_y[j] · along_x[i]: columns into one row, then along that row."""
     height, width = out.shape
-    first = np.empty((padded.shape[0], width), out.dtype)
-    for y in range(padded.shape[0]):
-        line = first[y]
+    wide = padded.shape[1]
+    total = np.empty(wide, out.dtype)
+    for y in range(height):
         source = padded[y]
+        tap = along_y[0]
+        for x in range(wide):
+            total[x] = tap * source[x]
+        for j in range(1, len(along_y)):
+            tap = along_y[j]
+            if tap != 0:
+                source = padded[y + j]
+                for x in range(wide):
+                    total[x] += tap * source[x]
+        line = out[y]
         tap = along_x[0]
         for x in range(width):
-            line[x] = tap * source[x]
+            line[x] = tap * total[x]
         for i in range(1, len(along_x)):
             tap = along_x[i]
             if tap != 0:
                 for x in range(width):
-                    line[x] += tap * source[x + i]
-    for y in range(height):
-        line = out[y]
-        source = first[y]
-        tap = along_y[0]
-        for x in range(width):
-            line[x] = tap * source[x]
-        for j in range(1, len(along_y)):
-            tap = along_y[j]
-            if tap != 0:
-                source = first[y + j]
-                for x in range(width):
-                    line[x] += tap * source[x]
+                    line[x] += tap * total[x + i]
 
 
 @kernel(nb.void(u8, nb.uint16[::1], nb.uint16[::1], u8))
 def separable_fixed(padded, along_x, along_y, out):
     """The same on bytes in fixed point: taps in 1/256 that sum to 256, halves rounded up at the end."""
     height, width = out.shape
-    first = np.empty((padded.shape[0], width), np.uint16)
-    for y in range(padded.shape[0]):
-        line = first[y]
-        source = padded[y]
-        for x in range(width):
-            line[x] = 0
-        for i in range(len(along_x)):
-            tap = along_x[i]
-            for x in range(width):
-                line[x] += tap * source[x + i]
-    total = np.empty(width, np.uint32)
+    wide = padded.shape[1]
+    first, total = np.empty(wide, np.uint16), np.empty(width, np.uint32)
     for y in range(height):
+        for x in range(wide):
+            first[x] = 0
+        for j in range(len(along_y)):
+            tap = along_y[j]
+            source = padded[y + j]
+            for x in range(wide):
+                first[x] += tap * source[x]
         for x in range(width):
             total[x] = 1 << 15
-        for j in range(len(along_y)):
-            tap = np.uint32(along_y[j])
-            source = first[y + j]
+        for i in range(len(along_x)):
+            weight = np.uint32(along_x[i])
             for x in range(width):
-                total[x] += tap * source[x]
+                total[x] += weight * first[x + i]
         line = out[y]
         for x in range(width):
             line[x] = total[x] >> 16

@@ -5,7 +5,7 @@ import numpy as np
 
 from vision3d.kernels import kernel
 
-__all__ = ["adaptive", "histogram"]
+__all__ = ["adaptive", "histogram", "look_up"]
 
 u8, i32 = nb.uint8[:, ::1], nb.int32[:, ::1]
 
@@ -37,3 +37,12 @@ def adaptive(image, mean, below, above, otherwise, out):
         for x in range(width):
             brighter = nb.int16(image[y, x]) - nb.int16(mean[y, x]) > below
             out[y, x] = above if brighter else otherwise
+
+
+@kernel(nb.void(u8, nb.uint8[::1], u8))
+def look_up(image, table, out):
+    """out = table[image]."""
+    height, width = image.shape
+    for y in range(height):
+        for x in range(width):
+            out[y, x] = table[image[y, x]]

@@ -1,7 +1,6 @@
 """Smallest and largest pixel under a structuring element, on an image that has been padded."""
 
 import numba as nb
-import numpy as np
 
 from vision3d.kernels import kernel
 
@@ -19,16 +18,18 @@ def extreme(padded, offsets, largest, out):
     height, width = out.shape
     for y in range(height):
         line = out[y]
-        source = padded[y + offsets[0, 0]]
-        shift = offsets[0, 1]
-        for x in range(width):
-            line[x] = source[x + shift]
-        for k in range(1, len(offsets)):
-            source = padded[y + offsets[k, 0]]
-            shift = offsets[k, 1]
-            if largest:
+        for k in range(len(offsets)):
+            # a slice, so that the loop below need not ask whether an index is negative
+            first = offsets[k, 1]
+            source = padded[y + offsets[k, 0], first : first + width]
+            if k == 0:
                 for x in range(width):
-                    line[x] = np.maximum(line[x], source[x + shift])
+                    line[x] = source[x]
+            elif largest:
+                for x in range(width):
+                    v = source[x]
+                    line[x] = max(line[x], v)
             else:
                 for x in range(width):
-                    line[x] = np.minimum(line[x], source[x + shift])
+                    v = source[x]
+                    line[x] = min(line[x], v)

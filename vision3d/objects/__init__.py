@@ -1,6 +1,14 @@
 """Objects in an image: pieces of a colour, or what a network of the user's finds."""
 
-from vision3d.objects.blobs import Blob, Blobs, LightMargin, find_blobs, largest_object, light_margin
+from vision3d.objects.blobs import (
+    Blob,
+    Blobs,
+    LightMargin,
+    find_blobs,
+    hue_margin,
+    largest_object,
+    light_margin,
+)
 from vision3d.objects.boxes import Detections, iou, non_maximum_suppression
 from vision3d.objects.colour import ColourRange, learn_colour
 from vision3d.objects.letterbox import Placement, letterbox
@@ -26,6 +34,7 @@ __all__ = [
     "class_scores",
     "find_blobs",
     "guess_layout",
+    "hue_margin",
     "iou",
     "largest_object",
     "learn_colour",

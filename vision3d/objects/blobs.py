@@ -24,7 +24,7 @@ from vision3d.image.morphology import closing, opening, structuring_element
 from vision3d.image.pixels import as_image
 from vision3d.objects.colour import ColourRange
 
-__all__ = ["Blob", "Blobs", "LightMargin", "find_blobs", "largest_object", "light_margin"]
+__all__ = ["Blob", "Blobs", "LightMargin", "find_blobs", "hue_margin", "largest_object", "light_margin"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,3 +170,24 @@ def light_margin(image: ArrayLike, colour: ColourRange, factor: float = 0.6, **o
         return np.count_nonzero(find_blobs(table[pixels], colour, **options).mask[window]) / before
 
     return LightMargin(after(factor), after(1 / factor), factor)
+
+
+def hue_margin(image: ArrayLike, colour: ColourRange, steps: float = 3.0, **options: int) -> float:
+    """By how much objects change when the ends of hue are moved by some steps of 2°, out and in.
+
+    Returns
+    -------
+    difference of their pixels over those now: near 0 where the ends lie between colours; large where one
+    of them cuts through the colour of something, so that a little other light moves its outline.  NaN where
+    there is no object, or no hue to move.
+
+    Parameters
+    ----------
+    options : those of `find_blobs`
+    """
+    wide, narrow = colour.with_hue_moved(steps), colour.with_hue_moved(-steps)
+    now = np.count_nonzero(find_blobs(image, colour, **options).mask)
+    if now == 0 or colour in (wide, narrow):
+        return float("nan")
+    areas = [np.count_nonzero(find_blobs(image, one, **options).mask) for one in (wide, narrow)]
+    return (areas[0] - areas[1]) / now

@@ -112,16 +112,16 @@ def non_maximum_suppression(
         raise ShapeError(f"labels have shape {kinds.shape}; expected {sure.shape}, one for each box")
     if not 0 <= most_overlap <= 1:
         raise DataError(f"non_maximum_suppression: most_overlap {most_overlap}; expected 0 to 1")
-    left = np.flatnonzero(sure > least_score)
-    left = left[np.argsort(-sure[left], kind="stable")]
-    kept: list[int] = []
-    while len(left) and (most == 0 or len(kept) < most):
-        best, left = int(left[0]), left[1:]
-        kept.append(best)
-        # by way of the distance in float32, as OpenCV goes: a box exactly at the limit falls on the same side
-        overlap = np.float32(1.0) - (1.0 - iou(rows[best], rows[left])[0]).astype(np.float32)
-        left = left[(overlap <= np.float32(most_overlap)) | (kinds[left] != kinds[best])]
-    return np.array(kept, np.int64)
+    from vision3d.kernels import object_boxes
+
+    order = np.flatnonzero(sure > least_score)
+    order = order[np.argsort(-sure[order], kind="stable")]
+    kept = np.empty(len(order), np.int64)
+    count = object_boxes.suppress(
+        np.ascontiguousarray(rows[order]), kinds[order], np.float32(most_overlap), most or len(order), kept
+    )
+    chosen_ones: NDArray[np.int64] = order[kept[:count]]
+    return chosen_ones
 
 
 def chosen(

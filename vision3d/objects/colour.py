@@ -11,7 +11,7 @@ BGR does, but thresholds set under one lamp still want a look under another: see
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -90,6 +90,17 @@ class ColourRange:
         joint = ".." if self.space == "lab" else "-"
         parts = (f"{a:g}{joint}{b:g}" for a, b in zip(self.low, self.high, strict=True))
         return f"{self.space}:{','.join(parts)}"
+
+    def with_hue_moved(self, steps: float) -> ColourRange:
+        """The range with both ends of hue moved outwards, or inwards where `steps` is negative.
+
+        A range that is not of HSV, or that has no ends of hue to move, is given back as it is.
+        """
+        width = (self.high[0] - self.low[0]) % HUES
+        if self.space != "hsv" or width >= HUES - 1 or not 0 < width + 2 * steps < HUES - 1:
+            return self
+        low, high = (self.low[0] - steps) % HUES, (self.high[0] + steps) % HUES
+        return replace(self, low=(low, *self.low[1:]), high=(high, *self.high[1:]))
 
     def mask(self, image: ArrayLike) -> NDArray[np.uint8]:
         """(h, w) 255 where a BGR image has the colour, 0 elsewhere."""

@@ -7,6 +7,8 @@ print(found.name(k), found.scores[k], found.boxes[k])
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -130,7 +132,8 @@ class ObjectNetwork:
         levels = (levels - mean) / deviation
         self._net.setInput(np.ascontiguousarray(levels.transpose(2, 0, 1)[None]))
         try:
-            outputs = self._net.forward(self._net.getUnconnectedOutLayersNames())
+            with _silent():
+                outputs = self._net.forward(self._net.getUnconnectedOutLayersNames())
         except cv2.error as error:
             shape = next(iter(self.file.inputs.values()))
             raise ShapeError(
@@ -174,11 +177,24 @@ class ObjectNetwork:
         return Segmentation(labels, confidence, self.names)
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep OpenCV from writing pages about an error that is raised anyway."""
+    import cv2
+
+    before = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(before)
+
+
 def _loaded(path: Path) -> Any:
     import cv2
 
     try:
-        return cv2.dnn.readNetFromONNX(str(path))
+        with _silent():
+            return cv2.dnn.readNetFromONNX(str(path))
     except cv2.error as error:
         raise FileFormatError(
             f"OpenCV {cv2.__version__} cannot run {path.name}: {_reason(error)}; export it for opset 11 to"

@@ -162,10 +162,10 @@ def _two_dimensional(outputs: Sequence[NDArray[np.float32]], layout: Layout) -> 
 
 
 def _at_least(rows: Floats, columns: int, layout: Layout) -> None:
-    if rows.shape[1] < columns:
-        raise ShapeError(
-            f"{layout}: rows have {rows.shape[1]} numbers; expected {columns} or more: another layout?"
-        )
+    exactly = layout in ("final", "ssd")
+    if rows.shape[1] < columns or (exactly and rows.shape[1] != columns):
+        wanted = f"{columns}{'' if exactly else ' or more'}"
+        raise ShapeError(f"{layout}: rows have {rows.shape[1]} numbers; expected {wanted}: another layout?")
 
 
 def _from_corners(corners: Floats) -> Floats:

@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 
 from sequential.errors import DataError, ShapeError
-from vision3d.objects import ColourRange, find_blobs, largest_object, learn_colour, light_margin
+from vision3d.objects import (
+    ColourRange,
+    find_blobs,
+    hue_margin,
+    largest_object,
+    learn_colour,
+    light_margin,
+)
 
 RED = ColourRange.from_text("hsv:170-8,120-255,60-255")
 
@@ -96,6 +103,25 @@ def test_a_range_too_tight_for_another_light_is_told():
     assert max(tight.darker, tight.brighter) < 0.05
     nothing = light_margin(image, ColourRange.from_text("hsv:50-60,200-255,*"))
     assert (nothing.darker, nothing.brighter) == (0.0, 0.0)
+
+
+def test_an_end_of_hue_that_cuts_through_a_colour_is_told():
+    y, x = np.mgrid[:80, :100]
+    hues = np.where(np.hypot(x - 50, y - 40) < 25, 2 + x // 5, 90)  # from 7 to 17 across the disc
+    wheel = np.dstack([hues, np.full_like(hues, 220), np.full_like(hues, 200)]).astype(np.uint8)
+    image = cv2.cvtColor(wheel, cv2.COLOR_HSV2BGR)
+    assert hue_margin(image, ColourRange.from_text("hsv:170-12,100-255,*")) > 0.5
+    assert hue_margin(image, ColourRange.from_text("hsv:170-30,100-255,*")) == 0.0
+    assert np.isnan(hue_margin(image, ColourRange.from_text("hsv:130-140,100-255,*")))
+    assert np.isnan(hue_margin(image, ColourRange.from_text("lab:*,*,*")))
+
+
+def test_ends_of_hue_moved():
+    assert RED.with_hue_moved(3).low[0] == 167
+    assert RED.with_hue_moved(3).high[0] == 11
+    assert RED.with_hue_moved(-9) == RED, "it would be gone"
+    assert ColourRange.from_text("hsv:*,1-2,*").with_hue_moved(-1).low[0] == 0
+    assert ColourRange.from_text("hsv:178-179,1-2,*").with_hue_moved(2).high[0] == 1
 
 
 def test_text_there_and_back():

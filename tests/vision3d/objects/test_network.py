@@ -149,9 +149,14 @@ def test_an_unknown_layout_is_said(shapes):
 
 @pytest.mark.parametrize(
     ("layout", "shape", "words"),
-    [("yolo", (1, 4, 20), "another layout"), ("final", (2, 5, 6), "one image"), ("ssd-pair", (1, 5, 4), "shapes"),
-     ("mask", (1, 2, 3, 3), "no boxes")],
-)  # fmt: skip
+    [
+        ("yolo", (1, 4, 20), "another layout"),
+        ("final", (2, 5, 6), "one image"),
+        ("ssd", (1, 6, 64), "another layout"),
+        ("ssd-pair", (1, 5, 4), "shapes"),
+        ("mask", (1, 2, 3, 3), "no boxes"),
+    ],
+)
 def test_a_layout_that_does_not_fit_is_said(layout, shape, words):
     outputs = [np.zeros(shape, np.float32)] * (2 if layout == "ssd-pair" else 1)
     outputs = [outputs[0], np.zeros((1, 9, 3), np.float32)] if layout == "ssd-pair" else outputs

@@ -1,0 +1,73 @@
+"""A picture with what was found in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from factorlab.report.style import blank
+
+if TYPE_CHECKING:
+    from factorlab.objects import Found
+
+__all__ = ["picture_with_objects"]
+
+# Okabe and Ito's colours
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+LARGEST = 1000  # px of the picture on the page
+NUMBERED = 60
+
+
+def picture_with_objects(found: Found) -> Figure:
+    """Boxes, crosses and numbers over the picture; the mask beside it where a colour or a map decided."""
+    image = found.image[:, :, ::-1]
+    height, width = image.shape[:2]
+    step = max(1, -(-max(height, width) // LARGEST))
+    columns = 1 if found.mask is None else 2
+    tall = min(11.0 / columns * height / width + 0.4, 8.0)
+    figure, axes = blank(tall, 1, columns)
+    extent = (-0.5, width - 0.5, height - 0.5, -0.5)
+    first = axes[0, 0]
+    first.imshow(image[::step, ::step], extent=extent)
+    names = list(dict.fromkeys(one.name for one in found.items))
+    edge = [patheffects.withStroke(linewidth=3.0, foreground="white")]
+    for k, one in enumerate(found.items, 1):
+        colour = COLOURS[names.index(one.name) % len(COLOURS)]
+        left, top, wide, high = one.box
+        first.add_patch(
+            Rectangle(
+                (left - 0.5, top - 0.5), wide, high, fill=False, edgecolor=colour, linewidth=1.6,
+                path_effects=edge,
+            )
+        )  # fmt: skip
+        if k <= NUMBERED:
+            first.plot(*one.centre, "+", color=colour, markersize=8, markeredgewidth=1.6, path_effects=edge)
+            first.annotate(
+                str(k), (left - 0.5, top - 0.5), xytext=(2, 2), textcoords="offset points", color=colour,
+                fontsize=10, fontweight="bold", path_effects=edge, annotation_clip=True,
+            )  # fmt: skip
+    first.set(xlim=extent[:2], ylim=extent[2:], title="picture", xlabel="x, px", ylabel="y, px")
+    if len(names) > 1:
+        handles = [
+            Rectangle((0, 0), 1, 1, color=COLOURS[k % len(COLOURS)]) for k in range(min(len(names), 6))
+        ]
+        figure.legend(handles, names[:6], loc="outside lower center", ncols=6)
+    if found.mask is not None:
+        second = axes[0, 1]
+        drawn = found.mask[::step, ::step]
+        if found.way == "colour":
+            second.imshow(drawn, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
+            second.set(title="pixels of the colour, cleaned")
+        else:
+            shown = np.where(drawn > 0, (drawn.astype(int) - 1) % 10, -1)
+            masked = np.ma.masked_less(shown, 0)
+            second.imshow(masked, cmap="tab10", vmin=0, vmax=9, extent=extent, interpolation="nearest")
+            second.set(title="classes of pixels, background white")
+        second.set(xlabel="x, px")
+        second.grid(visible=False)
+    first.grid(visible=False)
+    return figure
