@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from sequential.errors import FileFormatError, ModelError
 from vision3d.camera import Camera
-from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, number, row
+from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, number, row, size_of
 
 __all__ = ["colmap_cameras", "colmap_text", "is_colmap"]
 
@@ -97,10 +97,7 @@ def colmap_cameras(text: str, where: str) -> dict[str, Camera]:
         if lens == "fisheye4":
             coefficients += [0.0] * (4 - len(coefficients))
         fx, fy, cx, cy = intrinsics
-        try:
-            size = int(words[2]), int(words[3])
-        except ValueError as error:
-            raise FileFormatError(f"{place}: WIDTH and HEIGHT are whole numbers, got {words[2:4]}") from error
+        size = size_of(words[2:4], place)
         found[words[0]] = built(place, lens, [fx, fy, cx - HALF, cy - HALF], coefficients, size, wanted)
     return found
 

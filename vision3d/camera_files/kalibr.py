@@ -6,7 +6,7 @@ from typing import Any
 
 from sequential.errors import FileFormatError, ModelError
 from vision3d.camera import Camera
-from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, numbers, row
+from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, numbers, row, size_of
 
 __all__ = ["kalibr_cameras", "kalibr_text"]
 
@@ -69,6 +69,6 @@ def kalibr_cameras(
         count = 0 if lens == "pinhole" else 4
         coefficients = row(entry.get("distortion_coeffs") or [], count, "distortion_coeffs", place)
         own = entry.get("resolution")
-        at = (int(own[0]), int(own[1])) if own else size
+        at = size_of(own, place) if own else size
         found[name] = built(place, lens, intrinsics, coefficients, at, wanted)
     return found

@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from sequential.errors import FileFormatError, ModelError, ShapeError
+from sequential.errors import FileFormatError, ModelError, NotFiniteError, ShapeError
 from vision3d.camera import Camera
 from vision3d.lenses import LENSES
 
-__all__ = ["LENS_COMMENT", "built", "commented_lens", "number", "numbers", "row"]
+__all__ = ["LENS_COMMENT", "built", "commented_lens", "number", "numbers", "row", "size_of"]
 
 LENS_COMMENT = "# lens: "
 """A comment that keeps the name of a lens where the format has a larger one only."""
@@ -44,6 +44,22 @@ def row(values: Any, count: int | None, what: str, where: str) -> list[float]:
     return found
 
 
+def size_of(values: Any, where: str) -> tuple[int, int]:
+    """(width, height) of images as a file gave them.
+
+    Raises
+    ------
+    FileFormatError
+        where they are not two positive whole numbers.
+    """
+    found = row(values, 2, "the size of the images", where)
+    if not all(value >= 1.0 and value.is_integer() for value in found):
+        raise FileFormatError(
+            f"{where}: expected two whole numbers for the size of the images, got {values!r}"
+        )
+    return int(found[0]), int(found[1])
+
+
 def commented_lens(text: str) -> str | None:
     """The lens that a comment of ours names; None where there is none."""
     found = re.search(rf"{re.escape(LENS_COMMENT)}(\w+)", text)
@@ -73,5 +89,5 @@ def built(where: str, lens: str, intrinsics: Any, distortion: Any, size: Any, wa
             lens, distortion = wanted, distortion[:less]
     try:
         return Camera(lens, intrinsics, distortion, size)
-    except (ModelError, ShapeError) as error:
+    except (ModelError, NotFiniteError, ShapeError) as error:
         raise FileFormatError(f"{where}: {error}") from error

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sequential.errors import FileFormatError, ModelError, ShapeError
 from vision3d.camera import Camera
-from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, number
+from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, number, row, size_of
+from vision3d.camera_files.opencv_storage import storage_content
 from vision3d.camera_files.opencv_vector import lens_of_vector, split_matrix
 
 __all__ = ["opencv_cameras", "opencv_text"]
@@ -53,35 +53,23 @@ def opencv_text(camera: Camera, name: str = "camera") -> str:
     return "\n".join(lines) + "\n"
 
 
-def opencv_cameras(path: Path, text: str, where: str, size: tuple[int, int] | None) -> dict[str, Camera]:
+def opencv_cameras(text: str, where: str, size: tuple[int, int] | None) -> dict[str, Camera]:
     """The cameras of a file, by `camera`, or `left` and `right`.
 
     Raises
     ------
     FileFormatError
-        where OpenCV cannot read it, or none of the names is in it.
+        where it is damaged, or none of the names is in it.
     """
-    import cv2
-
-    from vision3d.frames.source import quiet
-
-    storage = None
-    try:
-        with quiet():
-            storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-            keys = set(storage.root().keys()) if storage.isOpened() else set()
-            content = {key: _value(storage.getNode(key)) for key in keys}
-    except (cv2.error, SystemError) as error:
-        raise FileFormatError(f"{where} is damaged: OpenCV cannot read it") from error
-    finally:
-        if storage is not None:
-            storage.release()
+    content = storage_content(text, where)
     if "Camera.fx" in content or "Camera1.fx" in content:
         return {"camera": _orb_slam(content, where, size)}
     found = {}
     for name, matrix, vector in NAMES:
         if name not in found and isinstance(content.get(matrix), np.ndarray):
             distortion = content.get(vector)
+            if distortion is not None and not isinstance(distortion, np.ndarray):
+                distortion = row(distortion, None, vector, where)
             found[name] = _camera(where, content, content[matrix], distortion, size, text)
     if not found:
         listed = ", ".join(sorted(content)[:8]) or "nothing"
@@ -99,17 +87,17 @@ def _camera(
         intrinsics = split_matrix(matrix)
     except (ModelError, ShapeError) as error:
         raise FileFormatError(f"{where}: {error}") from error
-    return built(where, lens, intrinsics, vector.tolist(), _size(content) or size, wanted)
+    return built(where, lens, intrinsics, vector.tolist(), _size(content, where) or size, wanted)
 
 
-def _size(content: dict[str, Any]) -> tuple[int, int] | None:
+def _size(content: dict[str, Any], where: str) -> tuple[int, int] | None:
     for width, height in SIZES:
         if width in content and height in content:
-            return int(content[width]), int(content[height])
+            return size_of([content[width], content[height]], where)
     for key in SIZE_LISTS:
-        given = np.ravel(content.get(key, []))
-        if given.size == 2 and given.dtype.kind in "if":
-            return int(given[0]), int(given[1])
+        given = content.get(key)
+        if isinstance(given, list | np.ndarray) and len(np.ravel(given)) == 2:
+            return size_of(list(np.ravel(given)), where)
     return None
 
 
@@ -119,27 +107,15 @@ def _orb_slam(content: dict[str, Any], where: str, size: tuple[int, int] | None)
     own = {key.removeprefix(prefix): value for key, value in content.items() if key.startswith(prefix)}
     fisheye = content.get("Camera.type") == "KannalaBrandt8"
     order = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")
-    coefficients = [float(own.get(name, 0.0)) for name in order]
+    coefficients = row([own.get(name, 0.0) for name in order], None, "Camera.k1 …", where)
     lens = "fisheye4" if fisheye else "brown5"
     try:
-        intrinsics = [float(own[name]) for name in ("fx", "fy", "cx", "cy")]
+        intrinsics = row([own[name] for name in ("fx", "fy", "cx", "cy")], 4, "Camera.fx …", where)
     except KeyError as error:
         raise FileFormatError(f"{where} has no {prefix}{error.args[0]}") from error
     sides = [content.get(f"Camera.{side}") for side in ("width", "height")]
-    told = (int(sides[0]), int(sides[1])) if sides[0] and sides[1] else size
+    told = size_of(sides, where) if sides[0] and sides[1] else size
     return built(where, lens, intrinsics, coefficients, told, None)
-
-
-def _value(node: Any) -> Any:
-    """A matrix, a number, a text or a list of numbers."""
-    if node.isMap():
-        matrix = node.mat()
-        return None if matrix is None else np.asarray(matrix, dtype=np.float64)
-    if node.isSeq():
-        return [_value(node.at(i)) for i in range(node.size())]
-    if node.isInt() or node.isReal():
-        return node.real()
-    return node.string() if node.isString() else None
 
 
 def _matrix(key: str, matrix: Any) -> list[str]:

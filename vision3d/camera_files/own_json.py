@@ -7,7 +7,7 @@ from typing import Any
 
 from sequential.errors import FileFormatError
 from vision3d.camera import Camera
-from vision3d.camera_files.numbers import built
+from vision3d.camera_files.numbers import built, row, size_of
 from vision3d.lenses import LENSES
 
 __all__ = ["camera_record", "is_record", "json_cameras", "json_text"]
@@ -59,7 +59,7 @@ def json_cameras(document: dict[str, Any], where: str) -> dict[str, Camera]:
         if not isinstance(given, dict) or set(given) != set(names):
             listed = ", ".join(names) or "nothing"
             raise FileFormatError(f"{where}: {block} of the lens {lens} holds {listed}; got {given!r}")
-        values.append([given[name] for name in names])
+        values.append(row([given[name] for name in names], None, f"the {block}", where))
     size = record.get("size")
-    pair = (int(size[0]), int(size[1])) if isinstance(size, list) and len(size) == 2 else None
+    pair = None if size is None else size_of(size, where)
     return {str(record.get("name") or "camera"): built(where, lens, values[0], values[1], pair, None)}

@@ -12,6 +12,7 @@ from vision3d.camera import Camera
 from vision3d.camera_files.colmap import colmap_cameras, is_colmap
 from vision3d.camera_files.kalibr import kalibr_cameras
 from vision3d.camera_files.opencv_files import opencv_cameras
+from vision3d.camera_files.opencv_storage import is_storage
 from vision3d.camera_files.own_json import is_record, json_cameras
 from vision3d.camera_files.ros import ros_cameras
 
@@ -58,23 +59,21 @@ def read_cameras(path: str | os.PathLike[str], *, size: Size | None = None) -> d
         text = where.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise FileFormatError(f"{where} is no text, and so no camera file") from error
-    cameras = _guessed(where, text, str(where), size)
+    cameras = _guessed(text, str(where), size)
     if not cameras:
         raise FileFormatError(f"{where} holds no camera")
     return cameras
 
 
-def _guessed(path: Path, text: str, where: str, size: Size | None) -> dict[str, Camera]:
+def _guessed(text: str, where: str, size: Size | None) -> dict[str, Camera]:
     begin = text.lstrip()[:200]
     if not begin:
         raise FileFormatError(f"{where} is empty")
     if begin.startswith("{"):
         document = _json(text, where)
-        return (
-            json_cameras(document, where) if is_record(document) else opencv_cameras(path, text, where, size)
-        )
-    if begin.startswith(("%YAML:1.0", "<?xml", "<opencv_storage")) or "!!opencv-matrix" in text:
-        return opencv_cameras(path, text, where, size)
+        return json_cameras(document, where) if is_record(document) else opencv_cameras(text, where, size)
+    if is_storage(text):
+        return opencv_cameras(text, where, size)
     if is_colmap(text):
         return colmap_cameras(text, where)
     document = _yaml(text, where)

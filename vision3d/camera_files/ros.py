@@ -6,7 +6,7 @@ from typing import Any
 
 from sequential.errors import FileFormatError, ModelError
 from vision3d.camera import Camera
-from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, numbers, row
+from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, numbers, row, size_of
 
 __all__ = ["ros_cameras", "ros_text"]
 
@@ -83,7 +83,7 @@ def ros_cameras(
             f"read; known are {known}"
         )
     if document.get("image_width") and document.get("image_height"):
-        size = int(document["image_width"]), int(document["image_height"])
+        size = size_of([document["image_width"], document["image_height"]], where)
     intrinsics = [matrix[0], matrix[4], matrix[2], matrix[5]]
     camera = built(where, lenses[len(coefficients)], intrinsics, coefficients, size, commented_lens(text))
     return {str(document.get("camera_name") or "camera"): camera}

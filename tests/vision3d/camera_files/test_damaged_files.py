@@ -1,10 +1,10 @@
 """Camera files that are none, or damaged: a sentence that names the file."""
 
 import pytest
-from lens_family import camera_of
+from lens_family import EVERY_CAMERA, camera_of
 
 from sequential.errors import DataError, FileFormatError, ModelError
-from vision3d.camera_files import camera_text, read_camera, write_camera
+from vision3d.camera_files import camera_text, formats_for, read_camera, read_cameras, write_camera
 
 MODEL = """\
 camera_matrix: {data: [500, 0, 320, 0, 500, 240, 0, 0, 1]}
@@ -72,3 +72,40 @@ def test_what_is_no_file_is_a_sentence(tmp_path):
         write_camera(camera_of("brown5"), tmp_path / "camera.ini")
     with pytest.raises(ModelError, match="no format 'ini'"):
         camera_text(camera_of("brown5"), "ini")
+
+
+EDITS = ("nan", "-", ".inf", "[", "]", "{", "}", ": ", "\n", "1e999", "null", "0", "!!", "\t", "é")
+
+
+def damaged(text, rng):
+    """A text after one to three accidents: something cut, changed, inserted, doubled, or the end missing."""
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(len(text)))
+        match int(rng.integers(5)):
+            case 0:
+                text = text[:at] + text[at + int(rng.integers(1, 30)) :]
+            case 1:
+                text = text[:at] + str(rng.choice(list("[]{}:,-.0e!%#\"' xN"))) + text[at + 1 :]
+            case 2:
+                text = text[:at] + str(rng.choice(EDITS)) + text[at:]
+            case 3:
+                text = text[: at + 1]
+            case _:
+                text = text[:at] + text[at // 2 : at // 2 + 20] + text[at:]
+    return text
+
+
+@pytest.mark.parametrize("camera", EVERY_CAMERA, ids=lambda camera: camera.lens)
+def test_no_accident_is_more_than_a_sentence(camera, tmp_path, rng):
+    """Whatever a file has become, it is read or refused; OpenCV's own reader aborts Python on some."""
+    told = []
+    for one in formats_for(camera):
+        path = tmp_path / one.file_name
+        for _ in range(60):
+            path.write_text(damaged(one.text(camera, "camera"), rng), encoding="utf-8")
+            try:
+                read_cameras(path, size=(640, 480))
+            except FileFormatError as error:
+                told.append((one.file_name, str(error)))
+    assert all(name in sentence for name, sentence in told)
+    assert len(told) > 60, "most accidents are seen"
