@@ -123,6 +123,7 @@ def schur(blocks: Blocks, free: Mask, damping: float = 0.0) -> tuple[Array, Arra
     return 0.5 * (S + S.T), right, T_inverse, Y
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a step to what is not finite is refused
 def adjust(
     problem: Problem,
     unknowns: Unknowns,
@@ -186,8 +187,7 @@ def _step(blocks: Blocks, free: Mask, damping: float) -> tuple[Array, Array, flo
     try:
         S, right, T_inverse, Y = schur(blocks, free, damping)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(S), 1e-300))
-        with np.errstate(over="ignore", invalid="ignore"):  # a step that is not finite is refused below
-            moved = scale * np.linalg.solve(S * scale[:, None] * scale[None, :], scale * right)
+        moved = scale * np.linalg.solve(S * scale[:, None] * scale[None, :], scale * right)
     except np.linalg.LinAlgError:
         return None
     pose_steps = np.einsum("vij,vj->vi", T_inverse, blocks.b) + Y @ moved
