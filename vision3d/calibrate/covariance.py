@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from vision3d.calibrate.adjustment import Blocks, schur
 
-__all__ = ["Covariances", "covariances"]
+__all__ = ["Covariances", "covariances", "reduced"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,7 +60,7 @@ class Covariances:
     weakest: Array
 
 
-def covariances(blocks: Blocks, free: Mask, scale: float) -> Covariances:
+def covariances(blocks: Blocks, free: Mask, scale: float, groups: NDArray[np.int64]) -> Covariances:
     """Covariances at a minimum.
 
     Parameters
@@ -71,6 +71,8 @@ def covariances(blocks: Blocks, free: Mask, scale: float) -> Covariances:
         What was estimated of θ, (q,).
     scale : float
         Standard deviation of the residuals in units of sigma.
+    groups : NDArray[np.int64]
+        Number of the group of every view, (V,): views of one group err alike.
     """
     S, _, T_inverse, Y = schur(blocks, free)
     sizes = 1.0 / np.sqrt(np.maximum(np.diag(S), 1e-300))
@@ -78,7 +80,7 @@ def covariances(blocks: Blocks, free: Mask, scale: float) -> Covariances:
     values = np.maximum(values, 1e-15 * values[-1])
     # columns of `root` are a basis in which the information matrix is the identity
     root = sizes[:, None] * vectors / np.sqrt(values)
-    scatter, inflation = _scatter(blocks, free, Y, root, scale)
+    scatter, inflation = _scatter(blocks, free, Y, root / scale, groups)
     joint, independent = scale**2 * root @ scatter @ root.T, scale**2 * root @ root.T
     weakest = np.zeros(len(free))
     weakest[free] = vectors[:, 0]
@@ -95,16 +97,18 @@ def covariances(blocks: Blocks, free: Mask, scale: float) -> Covariances:
     )
 
 
-def _scatter(blocks: Blocks, free: Mask, Y: Array, root: Array, scale: float) -> tuple[Array, float]:
+def _scatter(
+    blocks: Blocks, free: Mask, Y: Array, root: Array, groups: NDArray[np.int64]
+) -> tuple[Array, float]:
     """Covariance of the estimate in the basis in which independent corners give the identity; inflation."""
-    f, V = int(free.sum()), len(Y)
+    information, scores = reduced(blocks, free, Y)
+    f, V = int(free.sum()), int(groups.max()) + 1
+    together = np.eye(V)[:, groups]
+    # `root` carries scores to unit variance, and information to scale² times the identity in all
+    shares = np.einsum("gv,vij->gij", together, root.T @ information @ root)
+    shares /= np.trace(shares.sum(axis=0)) / f
+    scores = together @ scores @ root
     identity = np.eye(f)
-    if f == 0:
-        return identity, 1.0
-    information = blocks.U[:, free][:, :, free] + blocks.W[:, free] @ Y
-    shares = root.T @ information @ root
-    # at a minimum the poses' own gradients vanish, so the camera's is the whole score
-    scores = (blocks.a[:, free] + np.einsum("vip,vi->vp", Y, blocks.b)) @ root / scale
     values, vectors = np.linalg.eigh(0.5 * (shares + shares.transpose(0, 2, 1)))
     seen = np.clip(values, 0.0, LEVERAGE_MAX)
     turned = np.einsum("vij,vi->vj", vectors, scores) / np.sqrt(1.0 - seen)
@@ -117,6 +121,12 @@ def _scatter(blocks: Blocks, free: Mask, Y: Array, root: Array, scale: float) ->
     share = V / (V + f + 1.0)
     blended: Array = share * scatter + (1.0 - share) * factor * identity
     return blended, float(np.sqrt(factor))
+
+
+def reduced(blocks: Blocks, free: Mask, Y: Array) -> tuple[Array, Array]:
+    """Information (V, f, f) and scores (V, f) of every view about what is free, its pose eliminated."""
+    information = blocks.U[:, free][:, :, free] + blocks.W[:, free] @ Y
+    return information, blocks.a[:, free] + np.einsum("vip,vi->vp", Y, blocks.b)
 
 
 def _spread(matrix: Array, free: Mask) -> Array:

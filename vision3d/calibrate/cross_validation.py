@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vision3d.calibrate.adjustment import Unknowns, adjust
+from vision3d.calibrate.adjustment import Unknowns, adjust, linearize, schur
 from vision3d.calibrate.calibration import Calibration
+from vision3d.calibrate.covariance import reduced
+from vision3d.calibrate.look_alikes import folds_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.robust import weights_of
 
@@ -17,6 +19,9 @@ __all__ = ["LeaveOneOut", "held_out_squares", "leave_one_out"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+MANY_FOLDS = 60
+"""From here on one Newton step stands for the solve without a fold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +37,7 @@ class LeaveOneOut:
     train_rms_px : float
         The calibration's own, over the same corners.
     parameters : Array
-        (V, p), without each view in turn.
+        (G, p), without each view in turn, or each group of views alike.
     jackknife_std : Array
         (p,), standard deviations of the parameters by the jackknife: they include what the views have in
         common that independent noise does not explain, such as a bent board.
@@ -49,20 +54,20 @@ class LeaveOneOut:
 
 
 def leave_one_out(calibration: Calibration) -> LeaveOneOut:
-    """Leave out each view in turn.
+    """Leave out each view in turn, together with those that show the board in the same place.
 
     Corners that the calibration left out stay out, and views that it trusts less count as little here.
     Efron, Tibshirani 1993, "An introduction to the bootstrap", eq. 11.5, for the jackknife.
     """
     problem = Problem.of(calibration.views)
     weights = np.concatenate(calibration.weights)
-    folds = [[v] for v in range(problem.count)]
+    folds = folds_of(calibration.views)
     squares, parameters = held_out_squares(problem, calibration, weights, folds)
     full = weights == 1.0
     own = np.sum(np.concatenate(calibration.residuals) ** 2, axis=1)
     view_rms = np.sqrt([np.mean(one) for one in problem.split(squares)])
     spread = parameters - parameters.mean(axis=0)
-    std = np.sqrt((problem.count - 1) / problem.count * np.sum(spread**2, axis=0))
+    std = np.sqrt((len(folds) - 1) / len(folds) * np.sum(spread**2, axis=0))
     return LeaveOneOut(
         float(np.sqrt(np.mean(squares[full]))),
         view_rms,
@@ -95,22 +100,59 @@ def held_out_squares(
         (M,) px², and (folds, p).
     """
     weights = weights_of(problem, relative)
+    fits = _solved(problem, calibration, weights, folds)
+    if len(folds) > MANY_FOLDS:
+        fits = _stepped(problem, calibration, weights, folds)
+    squares, parameters = np.empty(len(weights)), []
+    for fold, (camera, warp) in zip(folds, fits, strict=True):
+        out = np.isin(np.arange(problem.count), fold)
+        rows = out[problem.owner]
+        tried = Unknowns(calibration.camera.lens, camera, warp, calibration.poses[out])
+        squares[rows] = _posed(problem.only(np.flatnonzero(out)), tried, weights[rows])
+        parameters.append(camera)
+    return squares, np.array(parameters)
+
+
+def _free(calibration: Calibration) -> Mask:
+    """What was estimated besides the poses."""
     p = calibration.camera.count
     free = np.ones(p + 2, dtype=bool)
     free[p:] = calibration.warp_std > 0.0
-    squares, parameters = np.empty(len(weights)), []
+    return free
+
+
+def _solved(
+    problem: Problem, calibration: Calibration, weights: Array, folds: Sequence[Sequence[int]]
+) -> Iterator[tuple[Array, Array]]:
+    """Parameters and warp without each fold, by an adjustment of the others."""
+    lens, free = calibration.camera.lens, _free(calibration)
     for fold in folds:
-        out = np.isin(np.arange(problem.count), fold)
-        owner = problem.owner
-        kept = Unknowns(
-            calibration.camera.lens, calibration.camera.parameters, calibration.warp, calibration.poses[~out]
-        )
-        rest = problem.only(np.flatnonzero(~out))
-        found = adjust(rest, kept, weights[~out[owner]], free, settled=1e-9).unknowns
-        parameters.append(found.parameters)
-        tried = Unknowns(found.lens, found.parameters, found.warp, calibration.poses[out])
-        squares[out[owner]] = _posed(problem.only(np.flatnonzero(out)), tried, weights[out[owner]])
-    return squares, np.array(parameters)
+        kept = ~np.isin(np.arange(problem.count), fold)
+        begun = Unknowns(lens, calibration.camera.parameters, calibration.warp, calibration.poses[kept])
+        rest = problem.only(np.flatnonzero(kept))
+        found = adjust(rest, begun, weights[kept[problem.owner]], free, settled=1e-9).unknowns
+        yield found.parameters, found.warp
+
+
+def _stepped(
+    problem: Problem, calibration: Calibration, weights: Array, folds: Sequence[Sequence[int]]
+) -> Iterator[tuple[Array, Array]]:
+    """The same by one Newton step from the minimum of all: among many views one moves it little.
+
+    Without the fold the information is S - S_f and the score -s_f, so θ moves by -(S - S_f)⁻¹ s_f.
+    """
+    free, p = _free(calibration), calibration.camera.count
+    camera = calibration.camera
+    blocks = linearize(
+        problem, Unknowns(camera.lens, camera.parameters, calibration.warp, calibration.poses), weights
+    )
+    S, _, _, Y = schur(blocks, free)
+    information, scores = reduced(blocks, free, Y)
+    for fold in folds:
+        moved = np.concatenate([camera.parameters, calibration.warp])
+        rest = S - information[list(fold)].sum(axis=0)
+        moved[free] -= np.linalg.solve(rest, scores[list(fold)].sum(axis=0))
+        yield moved[:p], moved[p:]
 
 
 def _posed(problem: Problem, unknowns: Unknowns, weights: Array) -> Array:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError
+from sequential.manifold.quaternion import quaternion_from_matrix
 from vision3d.calibrate.adjustment import Solution, Unknowns, adjust
 from vision3d.calibrate.calibration import Calibration
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.result import result_of
 from vision3d.calibrate.robust import fit_robustly, weights_of, weights_of_views
-from vision3d.calibrate.start import begin
+from vision3d.calibrate.start import begin, linear_pose
 from vision3d.camera import LENSES, Camera
 from vision3d.views import View
 
@@ -50,7 +51,8 @@ def calibrate(
     board_warp : bool
         Estimate as well how far the board is bent along x and along y.
     start : Calibration, optional
-        Begin from a calibration of the same views (any lens) instead of from nothing.
+        Begin from this camera (any lens) and its poses instead of from nothing; views that it does not name
+        are posed by its camera.
 
     Returns
     -------
@@ -75,7 +77,7 @@ def calibrate(
     views = tuple(views)
     _check(views, lens)
     problem = Problem.of(views)
-    begun = _grow(problem, lens, start, robust=robust)
+    begun = _grow(problem, views, lens, start, robust=robust)
     free = np.ones(len(begun.unknowns.parameters) + 2, dtype=bool)
     free[-2:] = board_warp
     return result_of(views, problem, fit_robustly(problem, begun, free, robust=robust), free)
@@ -110,7 +112,9 @@ def _size(view: View) -> str:
     return f"{view.size[0]}×{view.size[1]}"
 
 
-def _grow(problem: Problem, lens: str, start: Calibration | None, *, robust: bool) -> Solution:
+def _grow(
+    problem: Problem, views: tuple[View, ...], lens: str, start: Calibration | None, *, robust: bool
+) -> Solution:
     """Free the parameters in three stages, so that a strong distortion does not lead astray."""
     count = 4 + len(LENSES[lens].distortion)
     weights = weights_of(problem, np.ones(len(problem.points)))
@@ -118,7 +122,8 @@ def _grow(problem: Problem, lens: str, start: Calibration | None, *, robust: boo
         parameters = np.zeros(count)
         carried = _carried(start.camera, lens)
         parameters[: len(carried)] = carried
-        return _staged(problem, weights, Unknowns(lens, parameters, start.warp, start.poses), stages=1)
+        begun = Unknowns(lens, parameters, start.warp, _known_poses(views, start))
+        return _staged(problem, weights, begun, stages=1)
     found = begin(problem)
     if robust:
         weights = weights_of(problem, weights_of_views(problem, found.residuals))
@@ -127,6 +132,21 @@ def _grow(problem: Problem, lens: str, start: Calibration | None, *, robust: boo
         other = begin(problem, equidistant=not found.equidistant)
         tried.append(_staged(problem, weights, _first(problem, lens, other.focal, other.poses)))
     return min(tried, key=lambda one: one.cost)
+
+
+def _known_poses(views: tuple[View, ...], start: Calibration) -> Array:
+    """Poses to begin with: those of the views that the start has by name, the others by its camera."""
+    named = {view.name: pose for view, pose in zip(start.views, start.poses, strict=True)}
+    poses = []
+    for view in views:
+        if view.name in named and len(named) == len(start.views):
+            poses.append(named[view.name])
+            continue
+        rays = start.camera.unproject(view.pixels)
+        seen = np.isfinite(rays[:, 0])
+        R, t = linear_pose(view.points[seen], rays[seen])
+        poses.append(np.concatenate([quaternion_from_matrix(R), t]))
+    return np.array(poses)
 
 
 def _first(problem: Problem, lens: str, focal: float, poses: Array) -> Unknowns:

@@ -14,6 +14,7 @@ from vision3d.calibrate.adjustment import Unknowns, adjust
 from vision3d.calibrate.calibration import Calibration
 from vision3d.calibrate.cross_validation import held_out_squares
 from vision3d.calibrate.fit import calibrate
+from vision3d.calibrate.look_alikes import folds_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.result import result_of
 from vision3d.calibrate.robust import Trusted, weights_of
@@ -188,9 +189,7 @@ def _with_weights(
 
 
 def _score(found: Calibration, problem: Problem, weights: Array, offset: float) -> LensScore:
-    V = problem.count
-    folds = np.array_split(np.arange(V), min(V, MOST_FOLDS))
-    squares, _ = held_out_squares(problem, found, weights, [fold.tolist() for fold in folds])
+    squares, _ = held_out_squares(problem, found, weights, folds_of(found.views, MOST_FOLDS))
     full = weights == 1.0
     own = np.sum(np.concatenate(found.residuals) ** 2, axis=1)
     return LensScore(

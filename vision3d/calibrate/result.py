@@ -9,6 +9,7 @@ from sequential.errors import UnderConstrainedError
 from sequential.manifold.quaternion import rotation_matrix
 from vision3d.calibrate.calibration import Calibration, SolveReport
 from vision3d.calibrate.covariance import Covariances, covariances
+from vision3d.calibrate.look_alikes import groups_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.robust import Trusted
 from vision3d.camera import Camera
@@ -23,6 +24,8 @@ FREE_FOCAL = 0.25
 """Relative standard deviation of a focal length from which the views are said to leave it free."""
 WEAK_FOCAL = 0.01
 ILL = 1e8
+DISTINCT = 0.8
+"""Views that show the board in fewer places than this share of them are remarked upon."""
 
 
 def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free: Mask) -> Calibration:
@@ -38,7 +41,8 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     used = relative > 0.0
     freedom = max(2 * int(used.sum()) - int(free.sum()) - 6 * problem.count, 1)
     scale = float(np.sqrt(2.0 * solution.cost / freedom))
-    known = covariances(solution.blocks, free, scale)
+    groups = groups_of(views)
+    known = covariances(solution.blocks, free, scale, groups)
     p, follows = len(unknowns.parameters), known.pose_follows
     focal = float((np.sqrt(np.diag(known.independent)[:2]) / unknowns.parameters[:2]).max())
     if not focal < FREE_FOCAL:
@@ -51,7 +55,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     numbers = np.concatenate([view.ids for view in views])
     left_out = tuple((int(owner[i]), int(numbers[i])) for i in np.flatnonzero(~used))
     rms = float(np.sqrt(np.mean(squares[relative == 1.0])))
-    findings = _findings(views, camera, trusted, left_out, view_rms, known)
+    findings = _findings(views, camera, trusted, left_out, view_rms, known, groups)
     message = (
         f"{camera.lens}: {len(views)} views, {int(used.sum())} of {len(used)} corners, RMS {rms:.3f} px, "
         f"{'settled' if solution.converged else 'not settled'} after {trusted.iterations} steps"
@@ -110,6 +114,7 @@ def _findings(
     left_out: tuple[tuple[int, int], ...],
     view_rms: Array,
     known: Covariances,
+    groups: NDArray[np.int64],
 ) -> tuple[str, ...]:
     """Sentences about what a user should know."""
     found: list[str] = []
@@ -130,6 +135,12 @@ def _findings(
         for v in _from_behind(trusted.solution.unknowns.poses, views)
     )
     std = np.sqrt(np.diag(known.joint))
+    distinct = int(groups.max()) + 1
+    if distinct < DISTINCT * len(views):
+        found.append(
+            f"{len(views)} views show the board in only {distinct} places: those alike count as one where "
+            "views are compared; move the board more between views"
+        )
     if known.inflation > 1.0:
         found.append(
             "the corners of one view err together (a board that is not quite flat, a lens that is not quite "

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from calibration_worlds import world
 
-from vision3d.calibrate import calibrate
+from vision3d.calibrate import calibrate, cross_validation
 from vision3d.calibrate.cross_validation import leave_one_out
 from vision3d.views import View
 
@@ -47,6 +47,15 @@ def test_too_many_coefficients_for_the_views_are_found_out():
     few, many = (leave_one_out(calibrate(views, lens)) for lens in ("brown1", "thin12"))
     assert many.train_rms_px < few.train_rms_px
     assert many.rms_px > few.rms_px
+
+
+def test_one_step_from_the_minimum_of_all_stands_for_the_solve(monkeypatch):
+    found = calibrate(world(n=25, seed=8).views(np.random.default_rng(6)))
+    solved = leave_one_out(found)
+    monkeypatch.setattr(cross_validation, "MANY_FOLDS", 0)
+    stepped = leave_one_out(found)
+    assert stepped.rms_px == pytest.approx(solved.rms_px, rel=2e-3)
+    assert np.abs((stepped.parameters - solved.parameters) / found.std).max() < 0.1
 
 
 def test_a_shaken_view_does_not_decide():

@@ -174,6 +174,13 @@ def test_begins_anew_from_another_calibration():
     assert np.all(np.abs(again.camera.parameters - fresh.camera.parameters) < 1e-3 * fresh.std)
 
 
+def test_begins_from_a_calibration_of_fewer_views():
+    views = world(seed=13, n=9).views(np.random.default_rng(9))
+    once = calibrate(views[:6])
+    again, fresh = calibrate(views, start=once), calibrate(views)
+    assert np.all(np.abs(again.camera.parameters - fresh.camera.parameters) < 1e-2 * fresh.std)
+
+
 def test_corners_only_partly_seen():
     scene, rng = world(seed=14), np.random.default_rng(10)
     views = [view.subset(rng.random(54) < 0.6) for view in scene.views(rng)]
