@@ -14,6 +14,7 @@ from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
 from factorlab.cli.firmware import firmware
 from factorlab.cli.info import info
+from factorlab.cli.line import line
 from factorlab.cli.live import live
 from factorlab.cli.objects import objects
 from factorlab.cli.record import record
@@ -57,6 +58,7 @@ for command in (
     attitude,
     firmware,
     record,
+    line,
     live,
     camera,
     undistort,

@@ -10,6 +10,7 @@ from vision3d.lines.drawing import draw_lane, draw_line, draw_segments
 from vision3d.lines.ground import GroundHomography, GroundPoints, GroundReading
 from vision3d.lines.lane import Lane, find_lane
 from vision3d.lines.mount import CameraMount, planar_pose, plane_homography
+from vision3d.lines.scene import Scene, read_scene
 from vision3d.lines.segments import SegmentSettings, find_segments, merge_segments
 from vision3d.lines.settings import NO_LINE, LineReading, LineSettings
 from vision3d.lines.vanishing import VanishingPoint, vanishing_points
@@ -23,6 +24,7 @@ __all__ = [
     "Lane",
     "LineReading",
     "LineSettings",
+    "Scene",
     "SegmentSettings",
     "VanishingPoint",
     "draw_lane",
@@ -34,5 +36,6 @@ __all__ = [
     "merge_segments",
     "planar_pose",
     "plane_homography",
+    "read_scene",
     "vanishing_points",
 ]

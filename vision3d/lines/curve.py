@@ -48,7 +48,8 @@ def fit_curve(stripe: Stripe, bottom: float, middle: float) -> Curve | None:
     design = np.vander((y - scale) / scale, 4, increasing=True)
     ends = np.vander((np.array([bottom, middle]) - scale) / scale, 4, increasing=True)
     weights = np.ones(len(y))
-    coefficients, residual, sigma = np.zeros(4), x, 1.0
+    coefficients: Array = np.zeros(4)
+    residual: Array = x
     for _ in range(ROUNDS):
         root = np.sqrt(weights)[:, None]
         coefficients = np.linalg.lstsq(root * design, root[:, 0] * x, rcond=None)[0]

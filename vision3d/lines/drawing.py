@@ -17,7 +17,8 @@ Colour = NDArray[np.uint8]
 Array = NDArray[np.float64]
 SHIFT = 4  # OpenCV draws at 1/16 px
 # BGR, told apart by people who do not see red or green alike
-ORANGE, BLUE, GREEN, GREY = (0, 130, 240), (190, 110, 20), (90, 160, 30), (150, 150, 150)
+ORANGE, BLUE, GREEN = (0, 130, 240), (190, 110, 20), (90, 160, 30)
+GREY, WHITE = (150, 150, 150), (245, 245, 245)
 
 
 def draw_line(image: ArrayLike, reading: LineReading) -> Colour:
@@ -32,7 +33,7 @@ def draw_line(image: ArrayLike, reading: LineReading) -> Colour:
     ahead = 0.5 * (canvas.shape[1] - 1)
     bottom, middle = reading.bottom_px[1], reading.middle_px[1]
     for y in np.arange(bottom, middle, -24.0 * thick):
-        _polyline(canvas, np.array([[ahead, y], [ahead, max(y - 10.0 * thick, middle)]]), GREY, thick)
+        _polyline(canvas, np.array([[ahead, y], [ahead, max(y - 12.0 * thick, middle)]]), WHITE, thick)
     for k in (1, 2):
         _polyline(canvas, np.column_stack([reading.edges_px[:, k], reading.edges_px[:, 0]]), BLUE, thick)
     chord = np.array([reading.bottom_px, reading.middle_px])
@@ -80,7 +81,7 @@ def _canvas(image: ArrayLike) -> Colour:
 
 
 def _thickness(canvas: Colour) -> int:
-    return max(1, round(max(canvas.shape[:2]) / 500))
+    return max(1, round(float(max(canvas.shape[:2])) / 500.0))
 
 
 def _fixed(point: Sequence[float]) -> tuple[int, int]:

@@ -79,7 +79,7 @@ def _difference(small: NDArray[np.uint8], own: LineSettings, *, dark: bool) -> N
     grey = cv2.GaussianBlur(small, (0, 0), 1.0).astype(np.float32)
     if own.threshold == "otsu":
         level, _ = cv2.threshold(small, 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-        ground = np.float32(level + 0.5)
+        ground = np.full_like(grey, level + 0.5)
     else:
         ground = _ground(small, own.window)
     difference = ground - grey if dark else grey - ground
@@ -149,7 +149,7 @@ def _contrast(
 def _at(small: NDArray[np.uint8], y: NDArray[np.int64], x: Array) -> Array:
     """Grey levels at rounded places."""
     columns = np.clip(np.round(x).astype(int), 0, small.shape[1] - 1)
-    return small[y, columns].astype(np.float64)
+    return np.asarray(small[y, columns], dtype=np.float64)
 
 
 def _share(small: NDArray[np.uint8], left: Array, right: Array, y: NDArray[np.int64]) -> float:

@@ -54,13 +54,19 @@ class VanishingPoint:
         return float(np.arctan2(y - w * cy, x - w * cx) % np.pi)
 
     @property
+    def kind(self) -> str:
+        """Upright, level or slanting."""
+        lean = abs(self.angle_rad - 0.5 * np.pi)
+        return "upright" if lean < np.radians(20) else "level" if lean > np.radians(60) else "slanting"
+
+    @property
     def words(self) -> str:
         """What it is, for people."""
-        lean = abs(self.angle_rad - 0.5 * np.pi)
-        kind = "upright" if lean < np.radians(20) else "level" if lean > np.radians(60) else "slanting"
-        at = self.pixel
-        place = "parallel in the image" if at is None else f"meeting at ({at[0]:.0f}, {at[1]:.0f}) px"
-        return f"{len(self.members)} {kind} lines, {place}"
+        place = "parallel in the image"
+        if self.pixel is not None:
+            x, y = self.pixel
+            place = f"meeting at ({x:.0f}, {y:.0f}) px".replace("-", "−")
+        return f"{len(self.members)} {self.kind} lines, {place}"
 
 
 def vanishing_points(
@@ -119,7 +125,7 @@ def _best(segments: Array, size: tuple[int, int], angle_rad: float) -> Array | N
         _, _, axes = np.linalg.svd(weighted)
         moved = _scaling(size) @ axes[-1]
         point = moved / np.linalg.norm(moved)
-    return point
+    return np.asarray(point)
 
 
 def _scaling(size: tuple[int, int]) -> Array:

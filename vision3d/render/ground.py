@@ -159,7 +159,7 @@ def line_pixels(
         fine = np.column_stack([np.interp(dense, np.arange(len(edge)), edge[:, k]) for k in (0, 1)])
         pixels = camera.project(transform(world, np.column_stack([fine, np.zeros(len(fine))])))
         sides.append([_crossing(pixels, row) for row in rows])
-    return np.mean(sides, axis=0)
+    return np.asarray(np.mean(sides, axis=0))
 
 
 def _crossing(pixels: Array, row: float) -> float:
