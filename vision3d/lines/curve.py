@@ -52,7 +52,8 @@ def fit_curve(stripe: Stripe, bottom: float, middle: float) -> Curve | None:
     residual: Array = x
     for _ in range(ROUNDS):
         root = np.sqrt(weights)[:, None]
-        coefficients = np.linalg.lstsq(root * design, root[:, 0] * x, rcond=None)[0]
+        solved = np.linalg.lstsq(root * design, root[:, 0] * x, rcond=None)[0]
+        coefficients = np.asarray(solved, dtype=np.float64)
         residual = x - design @ coefficients
         sigma = max(1.4826 * float(np.median(np.abs(residual))), 0.02)
         weights = np.minimum(1.0, HUBER * sigma / np.maximum(np.abs(residual), 1e-12))
