@@ -50,7 +50,7 @@ def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
     def markers() -> Task:
         from factorlab.live.camera.tasks.markers import MarkersTask
 
-        return MarkersTask(settings.dictionary)
+        return MarkersTask(settings.camera, settings.marker_m, settings.dictionary)
 
     def calibrate() -> Task:
         from factorlab.live.camera.tasks.calibrate import CalibrateTask

@@ -1,0 +1,116 @@
+"""The markers task: numbers without a camera model, and with one poses that are the true ones."""
+
+import cv2
+import numpy as np
+import pytest
+from live_worlds import CAMERA, MARKER_M, MARKERS, marker_image, marker_pose
+
+from factorlab.live.camera.tasks.markers import PATIENCE, MarkersTask
+from sequential.errors import DataError
+from sequential.manifold import SE3
+from vision3d.frames import Frame
+
+
+def frame(k, image):
+    return Frame(k, round(k * 1e9 / 25), cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), f"frame {k}")
+
+
+@pytest.fixture(scope="module")
+def images():
+    rng = np.random.default_rng(4)
+    return [marker_image(k / 25, rng) for k in range(30)]
+
+
+@pytest.fixture
+def task():
+    made = MarkersTask(CAMERA, MARKER_M, "4x4_50")
+    made.prepare()
+    return made
+
+
+def test_without_a_model_there_are_numbers_and_places_in_the_image(images):
+    task = MarkersTask(dictionary="4x4_50")
+    reading = task.read(frame(0, images[0]))
+    assert [row["id"] for row in reading.rows] == sorted(MARKERS)
+    for row in reading.rows:
+        truth = CAMERA.project(marker_pose(row["id"], 0.0)[None, 4:])[0]
+        assert (row["x_px"], row["y_px"]) == pytest.approx(tuple(truth), abs=0.3)
+    assert "--camera" in reading.notes[0]
+    assert task.actions == ()
+    assert task.summary() == {"dictionary": "4x4_50", "ids": sorted(MARKERS)}
+    with pytest.raises(DataError, match="without a camera model"):
+        task.act("forget")
+
+
+def test_poses_are_the_true_ones_within_what_they_claim(task, images):
+    manifold, sigmas = SE3(), []
+    for k, image in enumerate(images):
+        reading = task.read(frame(k, image))
+        assert reading.headline.startswith("2 markers")
+        for row in reading.rows:
+            truth = marker_pose(row["id"], k / 25)
+            found = np.array([row[name] for name in ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")])
+            assert row["seen"] == 1
+            if k > 10:
+                assert np.linalg.norm(manifold.local(found, truth)[:3]) < np.radians(4.0)
+            error = (found[4:] - truth[4:]) / [row[f"sigma_{axis}"] for axis in ("x_m", "y_m", "z_m")]
+            sigmas.append(error)
+    assert np.median(np.abs(sigmas)) < 2.0
+    assert np.max(np.abs(sigmas)) < 8.0
+
+
+def test_axes_and_outline_are_drawn_where_the_marker_is(task, images):
+    reading = task.read(frame(0, images[0]))
+    origins = [mark.points[0] for mark in reading.marks if getattr(mark, "role", "") == "x"]
+    truth = CAMERA.project(np.array([marker_pose(k, 0.0)[4:] for k in sorted(MARKERS)]))
+    assert np.array(origins) == pytest.approx(truth, abs=0.5)
+
+
+def test_a_marker_that_vanishes_is_told_and_comes_back(task, images):
+    hidden = np.full_like(images[0], 120)
+    for k in range(5):
+        task.read(frame(k, images[k]))
+    reading = task.read(frame(5, hidden))
+    assert reading.headline == "no marker"
+    assert [row["seen"] for row in reading.rows] == [0, 0]
+    assert [row[-1] for row in reading.tables[0].rows] == ["not seen", "not seen"]
+    assert task.read(frame(6, images[6])).headline.startswith("2 markers")
+
+
+def test_the_same_frame_twice_changes_nothing(task, images):
+    first = frame(0, images[0])
+    assert task.read(first) is task.read(first)
+    task.restart()
+    task.read(frame(0, images[0]))  # time begins anew
+
+
+def test_tracks_begin_anew_by_a_button(task, images):
+    task.read(frame(9, images[9]))
+    assert dict(task.actions).keys() == {"forget"}
+    assert task.act("forget") == "the tracks begin anew"
+    task.read(frame(0, images[0]))
+
+
+def test_the_dictionary_is_found_out_frame_by_frame(images):
+    task = MarkersTask()
+    readings = [task.read(frame(k, images[0])) for k in range(12)]
+    assert readings[-1].headline == "2 markers"
+    assert task.summary()["dictionary"] == "4x4_50"
+    nothing = np.full_like(images[0], 120)
+    for k in range(PATIENCE + 2):
+        task.read(frame(20 + k, nothing))
+    assert task.summary()["dictionary"] == "auto"
+
+
+def test_an_open_pose_says_what_to_do(rng):
+    """A small marker that nearly faces the camera: one picture cannot tell its tilt."""
+    from vision3d.render import Plane, marker_texture, render_planes
+
+    turn = SE3().retract(SE3().identity(), np.array([0.12, 0.0, 0, 0, 0, 0]))
+    plane = Plane(np.array([*turn[:4], 0.02, 0.01, 1.1]), marker_texture("4x4_50", 3, MARKER_M))
+    image = render_planes(CAMERA, [plane], rng=rng, noise=3.0)
+    reading = MarkersTask(CAMERA, MARKER_M, "4x4_50").read(frame(0, image))
+    assert (reading.headline, reading.state) == ("1 marker, 1 with two poses", "warn")
+    assert reading.notes[0].startswith("3: two poses fit, odds ")
+    assert reading.rows[0]["odds"] < 20
+    assert reading.rows[0]["other_z_m"] == pytest.approx(1.1, rel=0.05)
