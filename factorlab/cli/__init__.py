@@ -18,6 +18,7 @@ from factorlab.cli.line import line
 from factorlab.cli.live import live
 from factorlab.cli.objects import objects
 from factorlab.cli.record import record
+from factorlab.cli.sheet import sheet
 from factorlab.cli.tune import tune
 from factorlab.cli.undistort import undistort
 
@@ -63,6 +64,7 @@ for command in (
     camera,
     undistort,
     objects,
+    sheet,
     info,
     doctor,
 ):
