@@ -143,3 +143,26 @@ def test_a_pixel_has_one_ray_at_most(camera, rng):
     np.testing.assert_allclose(camera.project(rays[known]), strange[known], atol=1e-6)
     assert known.any()
     assert camera_of(camera.lens) == camera
+
+
+def test_newton_that_would_go_to_and_fro():
+    """Between the middle and a flat end, its steps lead from one to the other for ever."""
+    camera = Camera("fisheye4", INTRINSICS, (0.0537366, -0.0447387, 0.5254898, -0.3770008))
+    angles = np.linspace(0.0, 0.9999, 400) * camera.limit
+    rays = np.column_stack([np.sin(angles), np.zeros(400), np.cos(angles)])
+    np.testing.assert_allclose(camera.unproject(camera.project(rays)), rays, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("lens", [lens for lens in LENSES if lens != "pinhole"])
+def test_every_image_of_a_radial_lens_has_its_ray(lens, rng):
+    """Whatever the coefficients: up to the fold there is one ray to a pixel, and it is found."""
+    for _ in range(300):
+        distortion = rng.choice([0.02, 0.1, 0.4]) * rng.standard_normal(len(LENSES[lens].distortion))
+        if lens != "fisheye4":
+            distortion[2:4], distortion[8:] = 0.0, 0.0
+        camera = Camera(lens, INTRINSICS, distortion)
+        reach = min(camera.limit, 1.9 if lens == "fisheye4" else 2.0)
+        t, turn = reach * rng.uniform(0.0, 0.999, 60), rng.uniform(0.0, 2.0 * np.pi, 60)
+        angle = t if lens == "fisheye4" else np.arctan(t)
+        rays = np.column_stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)])
+        np.testing.assert_allclose(camera.unproject(camera.project(rays)), rays, rtol=0, atol=1e-6)

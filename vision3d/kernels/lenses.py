@@ -205,6 +205,7 @@ def invert_radial(code, p, limit, target):
     elif not radial_one(code, p, high)[0] >= target:
         return math.nan
     t = min(max(target, low), high)
+    before = high - low
     for _ in range(NEWTON_MAX):
         f, d = radial_one(code, p, t)
         if f > target:
@@ -213,9 +214,11 @@ def invert_radial(code, p, limit, target):
             low = t
         step = (target - f) / d if d != 0.0 else math.inf
         ahead = t + step
-        if not low <= ahead <= high:
+        # between two flat ends Newton may go to and fro: steps that do not shrink give way to halving
+        if not low <= ahead <= high or abs(step) > 0.5 * before:
             ahead = 0.5 * (low + high)
-        if abs(ahead - t) <= 1e-16 * (1.0 + t):
+        before = abs(ahead - t)
+        if before <= 2e-16 * (1.0 + t):
             return ahead
         t = ahead
     return t
