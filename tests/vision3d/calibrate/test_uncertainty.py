@@ -153,7 +153,7 @@ def test_corners_that_err_together_are_found_out_and_the_deviations_stay_honest(
         rise = 1.0 - ((scene.points[:, :2] - 0.5 * (low + high)) / (0.5 * (high - low))) ** 2
         exact = []
         for pose in scene.poses:
-            bent = scene.points + np.c_[np.zeros((54, 2)), rise @ rng.normal(0.0, 0.0008, 2)]
+            bent = scene.points + np.c_[np.zeros((54, 2)), rise @ rng.normal(0.0, 0.0004, 2)]
             exact.append(scene.camera.project(rotate(pose[:4], bent) + pose[4:]))
         scene.exact = np.array(exact)
         found = calibrate(scene.views(rng, sigma_px=0.05))
