@@ -115,3 +115,34 @@ def test_angles_are_averaged_on_the_circle(d3):
         -179
     )
     assert d3.moyenne_circulaire(np.array([0.1, 0.2, 0.3]), weights) == pytest.approx(0.2)
+
+
+@pytest.fixture(scope="module")
+def e4():
+    return load("e4_composantes")
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 30), (30, 1), (25, 40)])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 1.0])
+def test_components_are_the_naive_ones(e4, shape, share, rng):
+    masque = rng.random(shape) < share
+    ours, naive = e4.composantes(masque), e4.composantes_naives(masque)
+    assert [area for area, _ in ours] == [area for area, _ in naive]
+    np.testing.assert_allclose([c for _, c in ours], [c for _, c in naive], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", [bool, np.uint8, float, int, list])
+def test_any_kind_of_mask(e4, kind):
+    rows = [[0, 255, 255], [0, 0, 255], [1, 0, 0]]
+    masque = rows if kind is list else np.array(rows).astype(kind)
+    assert e4.composantes(masque) == [(3, (5 / 3, 1 / 3)), (1, (0.0, 2.0))]
+    assert e4.plus_gros_objet(masque, 3) == (5 / 3, 1 / 3)
+    assert e4.plus_gros_objet(masque, 4) is None
+
+
+def test_a_long_snake_is_one_piece(e4):
+    masque = np.zeros((400, 401), bool)
+    masque[::2] = True
+    masque[1::4, -1] = masque[3::4, 0] = True  # to and fro over the whole image: no recursion survives it
+    ((area, _),) = e4.composantes(masque)
+    assert area == masque.sum()
