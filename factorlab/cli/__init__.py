@@ -16,6 +16,7 @@ from factorlab.cli.firmware import firmware
 from factorlab.cli.info import info
 from factorlab.cli.line import line
 from factorlab.cli.live import live
+from factorlab.cli.markers import markers
 from factorlab.cli.objects import objects
 from factorlab.cli.record import record
 from factorlab.cli.sheet import sheet
@@ -63,6 +64,7 @@ for command in (
     live,
     camera,
     undistort,
+    markers,
     objects,
     sheet,
     info,

@@ -4,7 +4,7 @@
 >>> pose.camera_T_board, pose.used, pose.left_out  # doctest: +SKIP
 
 A flat board far away has two readings as one marker has, so the pose is a `MarkerPose` with odds; markers at
-known places around a room have one.  A marker that does not fit the others (it was moved, or misread) is left out.
+known places around a room have one.  A marker that does not fit the others (moved, or misread) is left out.
 """
 
 from __future__ import annotations

@@ -76,14 +76,14 @@ def flat_modes_of_many(
     middle = points.mean(axis=0)
     own = np.ascontiguousarray(points - middle)
     A, n, rays = _linearised(camera, pixels)
-    usable = np.isfinite(rays).all(axis=(1, 2))
+    usable = np.asarray(np.isfinite(rays).all(axis=(1, 2)), dtype=np.bool_)
     R, t = np.empty((m, 2, 3, 3)), np.empty((m, 2, 3))
     usable[usable], R[usable, 0], t[usable, 0] = start_of_plane(own, rays[usable])
     best_R, best_t = np.empty_like(R), np.empty_like(t)
     cov, log_z, chi2 = np.empty((m, 2, 6, 6)), np.empty((m, 2)), np.empty((m, 2))
     limit, count = _quantile_95(2 * len(points) - 6), np.zeros(m, dtype=np.int64)
     W = whitening.copy()
-    for k in np.flatnonzero(usable):
+    for k in np.flatnonzero(usable).tolist():
         count[k] = posterior(
             own, n[k], A[k], W[k], limit, R[k], t[k], best_R[k], best_t[k], cov[k], log_z[k], chi2[k]
         )
@@ -101,9 +101,10 @@ def flat_modes_of_many(
         if not len(own_rows):
             found.append(None)
             continue
+        each = (poses, minima, covs, log_z[row, mode], rms)
+        own_poses, own_minima, own_covs, own_z, own_rms = (_frozen(value[own_rows]) for value in each)
         scale = max(1.0, float(chi2[k, 0]) / limit)
-        one = (poses, minima, covs, log_z[row, mode], rms)
-        found.append(FlatModes(*(_frozen(value[own_rows]) for value in one), scale=scale))
+        found.append(FlatModes(own_poses, own_minima, own_covs, own_z, own_rms, scale))
     return found
 
 

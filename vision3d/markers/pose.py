@@ -37,6 +37,8 @@ __all__ = ["CERTAIN", "MarkerPose", "Mode", "marker_corners", "marker_pose", "ma
 Array = NDArray[np.float64]
 CERTAIN = 20.0
 """Odds above which the other reading is left out of account."""
+LEAST = 1e-6
+"""No reading is less probable beside the other: a bent or half hidden marker says less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,7 @@ class MarkerPose:
 
     @property
     def odds(self) -> float:
-        """How many times likelier the first mode is; infinite where there is no second."""
+        """How many times likelier the first mode is, at most a million; infinite where there is no second."""
         if len(self.modes) < 2 or self.modes[1].probability <= 0.0:
             return float("inf")
         return self.modes[0].probability / self.modes[1].probability
@@ -174,7 +176,7 @@ def marker_poses(
 
 def pose_of_modes(found: FlatModes, size: float = 1.0) -> MarkerPose:
     """Order what the kernel found by probability, in units of `size` metres."""
-    weights = np.exp(found.log_z - found.log_z.max())
+    weights = np.maximum(np.exp(found.log_z - found.log_z.max()), LEAST)
     weights /= weights.sum()
     scale = np.array([1.0, 1.0, 1.0, size, size, size])
     covs, stretch = found.covs * np.outer(scale, scale), np.concatenate([np.ones(4), scale[3:]])
