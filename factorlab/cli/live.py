@@ -12,13 +12,22 @@ from factorlab.cli.settings import as_json, command_line, config_option, print_j
 
 if TYPE_CHECKING:
     from factorlab.live.camera import TaskSettings
-    from vision3d.frames import FrameSource
 
 __all__ = ["live"]
 
 TASKS = ("markers", "calibrate", "line", "features")
 KINDS = ("checkerboard", "charuco", "circles", "acircles")
 PORT = 8090
+
+
+def _resolution(context: click.Context, parameter: click.Parameter, text: str | None) -> Any:
+    """Width and height, px."""
+    if text is None:
+        return None
+    width, _, height = text.lower().replace("×", "x").partition("x")
+    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise click.BadParameter(f"a resolution is written as 640x480, got {text!r}")
+    return int(width), int(height)
 
 
 @click.group(short_help="A camera, live on a page.")
@@ -34,8 +43,9 @@ def live() -> None:
     "model",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Model of the camera, with which markers have poses: OpenCV, ROS, Kalibr, COLMAP or ours.",
+    help="Its calibration, in any format; markers then have poses.",
 )
+@click.option("--which", metavar="NAME", help="Camera of a file that has several: left, cam1, 2 …")
 @click.option("--size", default="50mm", show_default=True, metavar="LENGTH", help="Side of the markers.")
 @click.option("--dictionary", default="auto", show_default=True, help="Of the markers.")
 @click.option(
@@ -44,6 +54,10 @@ def live() -> None:
 @click.option("--square", default="25mm", show_default=True, metavar="LENGTH", help="Side of its squares.")
 @click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True, help="Of board.")
 @click.option("--marker", metavar="LENGTH", help="Side of the markers of a ChArUco board.")
+@click.option("--height", metavar="LENGTH", help="Of the camera above the ground: the line in metres.")
+@click.option(
+    "--pitch", type=click.FloatRange(-30, 90), metavar="DEG", help="Of the camera below the horizon."
+)
 @click.option("--lens", default="auto", show_default=True, help="Lens model of a calibration.")
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=PORT, show_default=True, help="Of the page; 0: any free."
@@ -59,6 +73,7 @@ def live() -> None:
 @click.option(
     "--fps", type=click.FloatRange(min=0, min_open=True), help="Of a folder of images, or to ask for."
 )
+@click.option("--resolution", metavar="WxH", callback=_resolution, help="To ask a camera for: 640x480.")
 @click.option("--exit", "leave", is_flag=True, help="End with the source.  [default: with Ctrl-C]")
 @click.option("--no-browser", is_flag=True, help="Only say where the page is.")
 @as_json
@@ -75,9 +90,8 @@ def camera(source: str, **options: Any) -> int:
     from factorlab.live.camera import CameraSession, PageServer, summary_of, task_choices
     from vision3d.frames import open_frames
 
-    settings = _settings(options)
-    frames = open_frames(source, loop=options["loop"], fps=options["fps"])
-    require_size(settings, frames)
+    frames = open_frames(source, loop=options["loop"], fps=options["fps"], size=options["resolution"])
+    settings = _settings(options, frames.size)
     session = CameraSession(
         frames, task_choices(settings), options["task"], recordings=settings.folder, fast=options["fast"]
     )
@@ -101,16 +115,20 @@ def camera(source: str, **options: Any) -> int:
     return _told(summary, quiet=options["as_json"])
 
 
-def _settings(options: dict[str, Any]) -> TaskSettings:
-    """What the tasks need to know; what is wrong with the board's options is the command line's fault."""
+def _settings(options: dict[str, Any], size: tuple[int, int]) -> TaskSettings:
+    """What the tasks need to know; what is wrong with lengths and boards is the command line's fault."""
     from factorlab.live.camera import TaskSettings
     from sequential.errors import ModelError
     from vision3d.boards import board_from_text, metres
-    from vision3d.camera_files import read_camera
+    from vision3d.camera_files.sized import read_camera_for
 
-    dictionary = options["dictionary"]
+    dictionary, model = options["dictionary"], options["model"]
+    hung = [name for name in ("height", "pitch") if options[name] is not None]
+    if hung and (len(hung) < 2 or model is None):
+        raise click.UsageError("a line in metres takes --camera, --height and --pitch together")
     try:
         marker_m = metres(options["size"], "size of a marker")
+        height_m = metres(options["height"], "height") if hung else None
         board = board_from_text(
             options["board"], kind=options["kind"], square=options["square"], marker=options["marker"],
             dictionary="4x4_50" if dictionary == "auto" else dictionary,
@@ -118,25 +136,16 @@ def _settings(options: dict[str, Any]) -> TaskSettings:
     except ModelError as error:
         raise click.UsageError(str(error)) from error
     return TaskSettings(
-        camera=None if options["model"] is None else read_camera(options["model"]),
+        camera=None if model is None else read_camera_for(model, size, which=options["which"]),
         marker_m=marker_m,
         dictionary=dictionary,
         board=board,
         lens=options["lens"],
+        height_m=height_m,
+        pitch_deg=options["pitch"],
         folder=options["record"] or Path("recordings"),
         command=command_line(),
     )
-
-
-def require_size(settings: TaskSettings, frames: FrameSource) -> None:
-    """Raise where the camera model belongs to images of another size than those that come."""
-    from sequential.errors import DataError
-
-    if settings.camera is not None and settings.camera.size != frames.size:
-        model, there = ("x".join(map(str, size)) for size in (settings.camera.size, frames.size))
-        raise DataError(
-            f"the camera model is for {model} images, {frames.name} gives {there}; calibrate at that size"
-        )
 
 
 def _told(summary: dict[str, Any], *, quiet: bool) -> int:

@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from live_worlds import FPS, Unplugged, marker_image, write_video
+from live_worlds import CAMERA, FPS, Unplugged, marker_image, write_video
 
 from factorlab.cli import main
+from vision3d.camera_files import write_camera
 from vision3d.frames import open_frames
 
 COMMAND = [sys.executable, "-m", "factorlab", "live", "camera"]
@@ -126,3 +127,40 @@ def test_a_folder_that_cannot_be_recorded_to_is_a_sentence(video, tmp_path):
 )
 def test_a_wrong_command_line_is_told_as_such(video, options):
     assert live(video, *options).exit_code == 2
+
+
+def test_a_camera_model_of_another_size_is_a_sentence(video, data_dir):
+    model = data_dir / "vision" / "opencv" / "left_intrinsics.yml"
+    done = live(video, *QUIET, "--exit", "--camera", model)
+    assert done.exit_code == 1
+    assert "is the calibration of images of 640x480 px, these are 320x240" in done.stderr
+
+
+def test_poses_of_markers_are_recorded(video, tmp_path):
+    write_camera(CAMERA, tmp_path / "camera.json", "json")
+    done = live(
+        video, *QUIET, "--exit", "--fast", "--json", "--record", tmp_path / "kept",
+        "--camera", tmp_path / "camera.json", "--size", "60mm", "--dictionary", "4x4_50",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["tasks"]["markers"] == {"dictionary": "4x4_50", "ids": [3, 7]}
+    table = (next((tmp_path / "kept").iterdir()) / "markers.csv").read_text(encoding="utf-8").splitlines()
+    rows = [dict(zip(table[0].split(","), line.split(","), strict=True)) for line in table[1:]]
+    assert len(rows) == 40
+    assert all(0.3 < float(row["z_m"]) < 0.5 and float(row["sigma_z_m"]) > 0 for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--height", "20cm"), "takes --camera, --height and --pitch together"),
+        (("--board", "9"), "columns x rows"),
+        (("--size", "50"), "did you mean 50mm?"),
+        (("--resolution", "640"), "a resolution is written as 640x480, got '640'"),
+    ],
+)
+def test_options_that_make_no_sense_are_told(video, options, words):
+    done = live(video, *QUIET, *options)
+    assert done.exit_code == 2
+    assert words in " ".join(done.stderr.split())

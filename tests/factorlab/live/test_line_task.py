@@ -71,3 +71,21 @@ def test_what_is_looked_for_is_changed_by_a_button(rng):
     assert task.read(dark).headline.startswith("line in the middle")
     with pytest.raises(DataError, match="a line is auto, dark, light; got 'blue'"):
         task.act("blue")
+
+
+def test_metres_on_the_ground_are_the_true_ones(rng):
+    """A straight line 6 cm to the left, seen from a camera that hangs 20 cm above the ground."""
+    from vision3d.camera import Camera
+    from vision3d.lines import CameraMount, GroundHomography
+    from vision3d.render.ground import GroundLine, render_ground
+
+    camera = Camera("pinhole", [300.0, 300.0, 159.5, 119.5], [], SIZE)
+    mount = CameraMount(height_m=0.2, pitch_rad=0.7)
+    stripe = GroundLine(np.array([[-1.0, 0.06], [3.0, 0.06]]), width_m=0.04)
+    image = render_ground(camera, mount, stripe, np.zeros(3), rng=rng)
+    task = LineTask(ground=GroundHomography.from_camera(camera, mount))
+    reading = task.read(Frame(0, 0, cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), ""))
+    row = reading.rows[0]
+    assert row["left_m"] == pytest.approx(0.06, abs=max(5 * row["left_sigma_m"], 1e-3))
+    assert row["ground_heading_deg"] == pytest.approx(0.0, abs=1.0)
+    assert [one.name for one in reading.numbers][:2] == ["line is to the left", "leads to the left"]

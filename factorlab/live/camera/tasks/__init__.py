@@ -12,7 +12,7 @@ from factorlab.live.camera.task import Task
 if TYPE_CHECKING:
     from vision3d.boards import Board
     from vision3d.camera import Camera
-    from vision3d.lines import LineSettings
+    from vision3d.lines import GroundHomography, LineSettings
 
 __all__ = ["TASKS", "TaskSettings", "task_choices"]
 
@@ -30,6 +30,7 @@ class TaskSettings:
     dictionary : of the markers
     board, lens : of a calibration; no board: a checkerboard of 9x6 inner corners and squares of 25 mm
     line : where a line may be, and what it looks like
+    height_m, pitch_deg : of the camera above the ground and below the horizon: the line is told in metres
     folder : calibrations are saved in folders of their own in it
     command : stands in reports
     """
@@ -40,6 +41,8 @@ class TaskSettings:
     board: Board | None = None
     lens: str = "auto"
     line: LineSettings | None = None
+    height_m: float | None = None
+    pitch_deg: float | None = None
     folder: Path = field(default=Path("recordings"))
     command: str = ""
 
@@ -62,7 +65,7 @@ def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
     def line() -> Task:
         from factorlab.live.camera.tasks.line import LineTask
 
-        return LineTask(settings.line)
+        return LineTask(settings.line, _ground(settings))
 
     def features() -> Task:
         from factorlab.live.camera.tasks.features import FeaturesTask
@@ -71,3 +74,15 @@ def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
 
     makers = {"markers": markers, "calibrate": calibrate, "line": line, "features": features}
     return tuple(TaskChoice(name, title, makers[name]) for name, title in TASKS.items())
+
+
+def _ground(settings: TaskSettings) -> GroundHomography | None:
+    """The ground, where the camera's model is known and where it hangs."""
+    if settings.camera is None or settings.height_m is None or settings.pitch_deg is None:
+        return None
+    from math import radians
+
+    from vision3d.lines import CameraMount, GroundHomography
+
+    mount = CameraMount(settings.height_m, radians(settings.pitch_deg))
+    return GroundHomography.from_camera(settings.camera, mount)

@@ -12,7 +12,7 @@ from factorlab.live.camera.reading import Column, Dots, Label, Line, Mark, Numbe
 from factorlab.live.camera.task import Action, Task
 from sequential.errors import DataError
 from vision3d.frames import Frame
-from vision3d.lines import LineReading, LineSettings, find_line
+from vision3d.lines import GroundHomography, GroundReading, LineReading, LineSettings, find_line
 
 __all__ = ["LineTask"]
 
@@ -26,16 +26,18 @@ class LineTask(Task):
     Parameters
     ----------
     settings : where to look, and for what
+    ground : the map to the ground; None: pixels only
     """
 
     name: ClassVar = "line"
     columns: ClassVar = (
         "found", "offset", "offset_sigma", "heading_deg", "heading_sigma_deg", "confidence",
         "bottom_x_px", "bottom_y_px", "middle_x_px", "middle_y_px", "width_px",
+        "left_m", "left_sigma_m", "ground_heading_deg", "ground_heading_sigma_deg",
     )  # fmt: skip
 
-    def __init__(self, settings: LineSettings | None = None) -> None:
-        self._settings = settings or LineSettings()
+    def __init__(self, settings: LineSettings | None = None, ground: GroundHomography | None = None) -> None:
+        self._settings, self._ground = settings or LineSettings(), ground
         self._frames = self._found = 0
 
     @property
@@ -53,11 +55,13 @@ class LineTask(Task):
         self._frames += 1
         self._found += found.found
         sigmas = spread(found, frame.image.shape[1])
+        place = self._place(found)
         angle = np.degrees(found.heading_rad)
         return Reading(
             _headline(found),
             "idle" if not found.found else "good" if found.confidence >= SURE else "warn",
             numbers=(
+                *_metres(place),
                 Number("offset", finite(found.offset), "of half the width", 3, finite(sigmas[0])),
                 Number("heading", finite(angle), "° to the right", 1, finite(np.degrees(sigmas[1]))),
                 Number("confidence", found.confidence, "", 2),
@@ -68,7 +72,7 @@ class LineTask(Task):
             traces={"offset": finite(found.offset), "heading, °": finite(angle)},
             marks=_marks(found, frame.image.shape),
             notes=(found.reason,) if found.reason else (),
-            rows=(self._row(found, sigmas),),
+            rows=(self._row(found, sigmas, place),),
         )
 
     def act(self, action: str) -> str:
@@ -86,12 +90,43 @@ class LineTask(Task):
         """In how many frames there was a line."""
         return {"frames": self._frames, "found": self._found}
 
-    def _row(self, found: LineReading, sigmas: tuple[float, float]) -> dict[str, Any]:
+    def _place(self, found: LineReading) -> GroundReading | None:
+        """The line on the ground; None where it is not known, or the far row shows the horizon."""
+        if self._ground is None or not found.found:
+            return None
+        try:
+            return self._ground.read(found)
+        except DataError:
+            return None
+
+    def _row(
+        self, found: LineReading, sigmas: tuple[float, float], place: GroundReading | None
+    ) -> dict[str, Any]:
         values = (
             int(found.found), found.offset, sigmas[0], *np.degrees([found.heading_rad, sigmas[1]]).tolist(),
             found.confidence, *found.bottom_px, *found.middle_px, found.width_px,
         )  # fmt: skip
-        return dict(zip(self.columns, values, strict=True))
+        row: dict[str, Any] = dict(zip(self.columns, values, strict=False))
+        if place is not None:
+            left, turn = np.sqrt(np.diag(place.cov)).tolist()
+            row |= {"left_m": place.offset_m, "left_sigma_m": left}
+            row |= {
+                "ground_heading_deg": float(np.degrees(place.heading_rad)),
+                "ground_heading_sigma_deg": float(np.degrees(turn)),
+            }
+        return row
+
+
+def _metres(place: GroundReading | None) -> tuple[Number, ...]:
+    """Where the line is on the ground."""
+    if place is None:
+        return ()
+    left, turn = np.sqrt(np.diag(place.cov)).tolist()
+    heading = float(np.degrees(place.heading_rad))
+    return (
+        Number("line is to the left", 1e3 * place.offset_m, "mm", 1, 1e3 * left),
+        Number("leads to the left", heading, "°", 1, float(np.degrees(turn))),
+    )
 
 
 def spread(found: LineReading, width: int) -> tuple[float, float]:
