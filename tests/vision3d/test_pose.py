@@ -88,7 +88,7 @@ def test_the_covariance_is_honest(lens, name, given, rng, seeds):
     """Normalised estimation errors squared have the mean of their degrees of freedom."""
     camera, points, sigma = camera_of(lens), OBJECTS[name], 0.25
     nees = []
-    for _ in range(20 * len(seeds)):
+    for _ in range(10 * len(seeds)):
         truth = random_pose(rng, points)
         pixels = project_object(camera, truth, points) + sigma * rng.standard_normal((len(points), 2))
         estimate = estimate_pose(camera, points, pixels, sigma if given else None)
