@@ -142,7 +142,9 @@ def undistort_maps(camera: Camera, target: Camera, camera_R_target: Array | None
     shape = target.size[::-1]
     columns, rows = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
     R = np.eye(3) if camera_R_target is None else np.ascontiguousarray(camera_R_target, dtype=np.float64)
-    fill_maps(camera.code, camera.parameters, camera.limit, target.parameters, R, columns, rows)
+    brown = np.zeros(12)
+    brown[: len(camera.distortion)] = camera.distortion
+    fill_maps(camera.code, camera.parameters, brown, camera.limit, target.parameters, R, columns, rows)
     return columns, rows
 
 

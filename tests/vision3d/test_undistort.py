@@ -28,6 +28,20 @@ def test_maps_are_opencv_s(camera, turn):
 
 
 @every_camera
+def test_maps_are_projections(camera):
+    """Pixel by pixel what `Camera.project` gives, and nowhere what it does not see."""
+    target = Camera("pinhole", (150.0, 160.0, 310.0, 245.0), (), (640, 480))
+    R = cv2.Rodrigues(np.array([0.1, -0.3, 0.05]))[0]
+    columns, rows = undistort_maps(camera, target, R)
+    across, down = np.meshgrid(np.arange(640.0), np.arange(480.0))
+    pixels = camera.project(target.unproject(np.stack([across, down], axis=-1)) @ R.T)
+    near = np.isfinite(pixels).all(axis=-1) & (np.abs(pixels) < 9e3).all(axis=-1)
+    np.testing.assert_allclose(columns[near], pixels[near][:, 0], rtol=2e-7, atol=1e-6)
+    np.testing.assert_allclose(rows[near], pixels[near][:, 1], rtol=2e-7, atol=1e-6)
+    assert (columns[np.isnan(pixels[..., 0])] == -1e4).all()
+
+
+@every_camera
 def test_no_rotation_is_the_identity(camera):
     target = undistorted_camera(camera)
     np.testing.assert_array_equal(target.intrinsics, camera.intrinsics)
