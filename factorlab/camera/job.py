@@ -20,22 +20,24 @@ if TYPE_CHECKING:
 __all__ = ["calibrate_held", "calibrate_pictures"]
 
 Say = Callable[[str], None]
+Progress = Callable[[str, int, int], None]  # what is being done, how much of it, out of how much
 FEWEST = 3  # views of which none can be left out
 FEW_LENS = "brown2"
 
 
-def silent(text: str) -> None:
+def silent(text: str, done: int = 0, total: int = 0) -> None:
     """Tell nobody."""
 
 
 def calibrate_pictures(
-    given: Sequence[str], settings: CameraSettings, *, say: Say = silent
+    given: Sequence[str], settings: CameraSettings, *, say: Say = silent, progress: Progress = silent
 ) -> CalibratedCamera:
     """Calibrate from files: names, patterns, folders, videos.
 
     Parameters
     ----------
     say : told in a sentence what could not be used
+    progress : told what is being done
 
     Raises
     ------
@@ -50,7 +52,7 @@ def calibrate_pictures(
     for one in pictures.left_out:
         say(f"left out: {one}")
     other = None if settings.compare is None else compared(settings.compare, pictures.size)
-    return calibrate_held(pictures, settings, other=other, say=say)
+    return calibrate_held(pictures, settings, other=other, say=say, progress=progress)
 
 
 def compared(path: Path, size: tuple[int, int]) -> Camera:
@@ -73,14 +75,20 @@ def compared(path: Path, size: tuple[int, int]) -> Camera:
 
 
 def calibrate_held(
-    pictures: ImageSet, settings: CameraSettings, *, other: Camera | None = None, say: Say = silent
+    pictures: ImageSet,
+    settings: CameraSettings,
+    *,
+    other: Camera | None = None,
+    say: Say = silent,
+    progress: Progress = silent,
 ) -> CalibratedCamera:
     """Calibrate from pictures in memory; `other` is what to compare with.  Raises as `calibrate_pictures`."""
     from vision3d.calibrate import difference, leave_one_out, next_pose
 
     seconds: dict[str, float] = {}
     with timed(seconds, "detection"):
-        detections = detected(pictures, settings, say)
+        detections = detected(pictures, settings, say, progress)
+    progress("the lens", len(pictures), len(pictures))
     with timed(seconds, "lens"):
         choice, fit = _fitted(detections, settings, say)
     with timed(seconds, "checks"):
@@ -90,7 +98,7 @@ def calibrate_held(
     return CalibratedCamera(settings, pictures, detections, fit, choice, cross, following, apart, seconds)
 
 
-def detected(pictures: ImageSet, settings: CameraSettings, say: Say) -> Detections:
+def detected(pictures: ImageSet, settings: CameraSettings, say: Say, progress: Progress) -> Detections:
     """Find the board in every picture.
 
     Raises
@@ -100,7 +108,10 @@ def detected(pictures: ImageSet, settings: CameraSettings, say: Say) -> Detectio
     """
     from vision3d.calibrate.detection import detect_views
 
-    detections = detect_views(pictures, settings.board, window=settings.window)
+    def seen(count: int, name: str) -> None:
+        progress(name, count, len(pictures))
+
+    detections = detect_views(pictures, settings.board, window=settings.window, progress=seen)
     for one in detections.missed:
         say(f"{one.name}: {one.reason}")
     for text in detections.findings:

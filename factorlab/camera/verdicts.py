@@ -71,7 +71,7 @@ def _corners(done: CalibratedCamera) -> list[Verdict]:
     pictures = list(dict.fromkeys(fit.views[view].name for view, _ in fit.outliers))
     where = f"{', '.join(pictures[:4])}{' …' if len(pictures) > 4 else ''}"
     meaning = f"of {total}, in {where}: noise does not explain them"
-    action = "look at the cut-outs below: glare, a finger, blur" if status != "PASS" else ""
+    action = "look at their cut-outs in the report: glare, a finger, blur" if status != "PASS" else ""
     return [Verdict("corners left out", lost, None, status, meaning, action)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import in_one_sentence
+from factorlab.cli.progress import bar
 from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
 
 if TYPE_CHECKING:
@@ -75,7 +77,13 @@ def camera(sources: tuple[str, ...], **options: Any) -> int:
 
     require_output(options["out"], None, force=options["force"])
     settings = _settings(options)
-    done = calibrate_pictures(sources, settings, say=lambda text: click.echo(text, err=True))
+    told: list[str] = []
+    try:
+        with bar("camera", shown=sys.stderr.isatty()) as progress:
+            done = calibrate_pictures(sources, settings, say=told.append, progress=progress)
+    finally:  # what was left out is said once the bar is gone, also where the rest ends in an error
+        for text in told:
+            click.echo(text, err=True)
     command = command_line()
     return deliver(
         camera_document(done, command),
