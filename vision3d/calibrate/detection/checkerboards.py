@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from vision3d.calibrate.detection.lattice import Array
 from vision3d.calibrate.detection.lattice_growth import Grid
 from vision3d.calibrate.detection.ordering import Cells, dark_first, laid_out, parity_sign, turned_towards
 from vision3d.calibrate.detection.refine import refine_saddles
+from vision3d.calibrate.detection.search import believable, enlarged, scales
 
 __all__ = ["find_checkerboard"]
 
@@ -19,8 +22,9 @@ Grey = NDArray[np.uint8]
 
 AGREED = 0.8
 """Mean agreement of the corners about the colour of the squares, below which a grid is no checkerboard."""
-WIDE_PX = 1200
 FILLED = 0.6
+BLURS_PX = (1.5, 1.0, 3.0)
+"""Smoothings to try: fine ones for small squares, coarse ones for blurred images."""
 
 
 def find_checkerboard(grey: Grey, board: Checkerboard) -> Found | NotFound:
@@ -32,29 +36,34 @@ def find_checkerboard(grey: Grey, board: Checkerboard) -> Found | NotFound:
     board : what to look for
     """
     seen: list[Grid] = []
-    for blur_px in _blurs(grey):
-        for grid in find_grids(grey, blur_px)[:4]:
-            whole = grid.trimmed()
-            if sorted(whole.shape) == sorted(board.shape) and len(whole.cells) >= FILLED * board.count:
-                way = _filled(Cells(whole.pixels, whole.cells, whole.shape))
-                if (found := _settled(grey, way, board, "grown grid")) is not None:
-                    return found
-            elif min(whole.shape) >= 3:
-                seen.append(whole)
+    for image, scale in scales(grey):
+        for blur_px in BLURS_PX:
+            for grid in find_grids(image, blur_px)[:4]:
+                whole = grid.trimmed()
+                if sorted(whole.shape) == sorted(board.shape) and len(whole.cells) >= FILLED * board.count:
+                    way = _filled(Cells(enlarged(whole.pixels, scale), whole.cells, whole.shape))
+                    if (found := _settled(grey, way, board, "grown grid")) is not None:
+                        return found
+                elif min(whole.shape) >= 3 and believable(
+                    whole.cells, whole.pixels, whole.shape[0] * whole.shape[1], image.shape[::-1]
+                ):
+                    seen.append(whole)
+        if (another := _instead(seen, board)) is not None:
+            return NotFound(another)
     for name, pixels in _opencv(grey, board):
         way = Cells(pixels, np.array(board.lattice), board.shape)
         if (found := _settled(grey, way, board, name)) is not None:
             return found
+    return NotFound(_instead(seen, board, least=0.0))
+
+
+def _instead(seen: list[Grid], board: Checkerboard, least: float = 0.5) -> tuple[int, int] | None:
+    """Size of the largest other grid, longer side first, if it has at least a share of the board's points."""
     largest = max(seen, key=lambda grid: len(grid.cells), default=None)
-    if largest is None:
-        return NotFound()
+    if largest is None or len(largest.cells) < least * board.count:
+        return None
     columns, rows = largest.shape
-    return NotFound((max(columns, rows), min(columns, rows)))
-
-
-def _blurs(grey: Grey) -> tuple[float, ...]:
-    """Smoothings to try: fine ones for small squares, coarse ones for large or blurred images."""
-    return (1.5, 1.0, 3.0) if max(grey.shape) <= WIDE_PX else (2.0, 4.0, 1.2, 7.0)
+    return max(columns, rows), min(columns, rows)
 
 
 def _filled(way: Cells) -> Cells:
@@ -78,29 +87,24 @@ def _filled(way: Cells) -> Cells:
     return Cells(pixels, every.astype(np.int64), way.shape)
 
 
-def _opencv(grey: Grey, board: Checkerboard) -> list[tuple[str, Array]]:
-    """What OpenCV finds: as the image is, equalised, at half and at twice its size."""
+def _opencv(grey: Grey, board: Checkerboard) -> Iterator[tuple[str, Array]]:
+    """What OpenCV finds: as the image is, equalised, and by sectors; large images reduced."""
     import cv2
 
     from vision3d.cv import find_chessboard
 
+    image, scale = next(scales(grey))
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-    quick = flags | cv2.CALIB_CB_FAST_CHECK
-    columns, rows = board.shape
-    equalised = cv2.createCLAHE(3.0, (8, 8)).apply(grey)
-    tries = [("OpenCV", grey, 1.0), ("OpenCV, equalised", equalised, 1.0)]
-    if max(grey.shape) > 2 * WIDE_PX:
-        tries = []
-    if max(grey.shape) > WIDE_PX:
-        scale = 0.8 * WIDE_PX / max(grey.shape)
-        tries.append(("OpenCV, reduced", cv2.resize(grey, None, fx=scale, fy=scale,
-                                                    interpolation=cv2.INTER_AREA), scale))  # fmt: skip
-    for name, image, scale in tries:
-        whole, pixels = find_chessboard(image, columns, rows, flags=quick if "equal" in name else flags)
+    equalised = np.asarray(cv2.createCLAHE(3.0, (8, 8)).apply(image), dtype=np.uint8)
+    tries = (
+        ("OpenCV", image, {"flags": flags}),
+        ("OpenCV, equalised", equalised, {"flags": flags | cv2.CALIB_CB_FAST_CHECK}),
+        ("OpenCV, by sectors", image, {"sector_based": True}),
+    )
+    for name, one, options in tries:
+        whole, pixels = find_chessboard(one, *board.shape, **options)
         if whole and len(pixels) == board.count:
-            return [(name, (pixels + 0.5) / scale - 0.5)]
-    whole, pixels = find_chessboard(grey, columns, rows, sector_based=True)
-    return [("OpenCV, sector based", pixels)] if whole and len(pixels) == board.count else []
+            yield name, enlarged(pixels, scale)
 
 
 def _settled(grey: Grey, way: Cells, board: Checkerboard, finder: str) -> Found | None:

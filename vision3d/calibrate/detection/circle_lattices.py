@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision3d.boards import CircleGrid
+from vision3d.calibrate.detection.lattice import Ids
 from vision3d.calibrate.detection.lattice_growth import Cell, grow
 from vision3d.calibrate.detection.ordering import Cells
+from vision3d.calibrate.detection.search import believable
 
 __all__ = ["Lattice", "find_lattices"]
 
@@ -22,6 +24,8 @@ AREA_PX = 20.0
 ROUND = 0.12
 """How far the area of a blob may be from that of the ellipse with its moments."""
 FLAT = 6.0
+MOST, THIN = 0.05, 0.25
+"""Share of the image that a circle takes at most, and share of its upright box at least."""
 ALIKE = 2.5
 """Ratio of the areas of neighbours."""
 SEEDS, SMALLEST = 6, 6
@@ -66,7 +70,7 @@ def find_lattices(grey: Grey, board: CircleGrid, *, dark: bool) -> Iterator[Latt
                 free[list(cells.values())] = False
                 grids.append(cells)
         for cells in sorted(grids, key=lambda one: -len(one)):
-            yield _numbered(blobs.centres, cells, board)
+            yield _numbered(blobs.centres, cells, board, (grey.shape[1], grey.shape[0]))
 
 
 def _masks(grey: Grey, *, dark: bool) -> Iterator[Grey]:
@@ -86,9 +90,16 @@ def _round_blobs(mask: Grey) -> Blobs:
     """Connected components that are filled ellipses, by their moments."""
     import cv2
 
-    count, labels = cv2.connectedComponents(mask, connectivity=4, ltype=cv2.CV_32S)
-    y, x = np.nonzero(mask)
-    label = labels[y, x]
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4, ltype=cv2.CV_32S)
+    box = stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]
+    counted = stats[:, cv2.CC_STAT_AREA]
+    likely = (counted >= AREA_PX) & (counted < MOST * mask.size) & (counted > THIN * box)
+    likely[0] = False
+    renumbered = np.cumsum(likely) * likely
+    label = renumbered[labels]
+    y, x = np.nonzero(label)
+    label = label[y, x] - 1
+    count = int(likely.sum())
     area = np.maximum(np.bincount(label, minlength=count).astype(np.float64), 1e-9)
 
     def mean(values: Array) -> Array:
@@ -103,8 +114,7 @@ def _round_blobs(mask: Grey) -> Blobs:
     det = np.maximum(xx * yy - xy * xy, 1e-12)
     flat = (0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)) ** 2 / det
     full = np.abs(area / (4.0 * np.pi * np.sqrt(det)) - 1.0) < ROUND
-    good = full & (area >= AREA_PX) & (flat < FLAT**2) & (area < 0.1 * mask.size)
-    good[0] = False
+    good = full & (flat < FLAT**2)
     return Blobs(np.stack([mx, my], axis=1)[good], area[good])
 
 
@@ -141,52 +151,61 @@ def _alike(blobs: Blobs, candidate: int, so_far: dict[Cell, int]) -> bool:
     return bool(size / ALIKE < blobs.areas[candidate] < size * ALIKE)
 
 
-def _numbered(centres: Array, cells: dict[Cell, int], board: CircleGrid) -> Lattice:
+def _numbered(
+    centres: Array, cells: dict[Cell, int], board: CircleGrid, image_size: tuple[int, int]
+) -> Lattice:
     """Every way in which the lattice is the board seen from its front, and its size."""
     places, at = np.array(list(cells)), centres[list(cells.values())]
     x, y = (at - at.mean(axis=0)).T @ (places - places.mean(axis=0))
     if x[0] * y[1] - x[1] * y[0] < 0.0:
         places = places[:, ::-1]
     ways: dict[bytes, Cells] = {}
-    size = (0, 0)
+    size, count = (0, 0), 0
     for change in CHANGES:
         laid = places @ change.T
         if board.asymmetric:
             laid = np.stack([laid[:, 0] - laid[:, 1], laid.sum(axis=1)], axis=1)
-        way, shape = _on_board(laid, at, board)
+        way, shape, kept = _on_board(laid, at, board)
         if way is not None:
             ways[way.ids.tobytes()] = way
-        elif change is CHANGES[0]:
-            size = shape
+        elif kept.sum() > count and believable(laid[kept], at[kept], shape[0] * shape[1], image_size):
+            size, count = shape, int(kept.sum())
     # a sheared lattice may fit as well, without its rim
     most = max((len(way.cells) for way in ways.values()), default=0)
     return Lattice(tuple(way for way in ways.values() if len(way.cells) == most), size)
 
 
-def _on_board(laid: NDArray[np.int64], at: Array, board: CircleGrid) -> tuple[Cells | None, tuple[int, int]]:
-    """The lattice as cells of the board, rows and columns that are hardly there taken off; and its size."""
-    density = 0.5 if board.asymmetric else 1.0
-    while len(laid):
-        low, high = laid.min(axis=0), laid.max(axis=0)
-        ends = [(axis, int(end)) for axis in (0, 1) for end in (low[axis], high[axis])]
-        spans = high - low + 1
-        shares = [np.sum(laid[:, axis] == end) / (density * spans[1 - axis]) for axis, end in ends]
-        worst = int(np.argmin(shares))
-        if shares[worst] >= LEAST:
-            break
-        axis, end = ends[worst]
-        keep = laid[:, axis] != end
-        laid, at = laid[keep], at[keep]
-    if not len(laid):
-        return None, (0, 0)
+def _on_board(
+    laid: Ids, at: Array, board: CircleGrid
+) -> tuple[Cells | None, tuple[int, int], NDArray[np.bool_]]:
+    """The lattice as cells of the board; its size, and which points are not on a rim that is hardly there."""
+    kept = _without_sparse_rim(laid, 0.5 if board.asymmetric else 1.0)
+    laid, at = laid[kept], at[kept]
     laid = laid - laid.min(axis=0)
     width, height = (laid.max(axis=0) + 1).tolist()
     if not board.asymmetric:
         whole = (width, height) == board.shape
-        return (Cells(at, laid, board.shape) if whole else None), (width, height)
+        return (Cells(at, laid, board.shape) if whole else None), (width, height), kept
     odd = laid[:, 1] % 2
     fits = bool(np.all((laid[:, 0] - odd) % 2 == 0))
     columns = (width + 1) // 2
     whole = fits and (columns, height) == board.shape and width == 2 * columns
     cells = np.stack([(laid[:, 0] - odd) // 2, laid[:, 1]], axis=1)
-    return (Cells(at, cells, board.shape) if whole else None), (columns, height)
+    return (Cells(at, cells, board.shape) if whole else None), (columns, height), kept
+
+
+def _without_sparse_rim(laid: Ids, density: float) -> NDArray[np.bool_]:
+    """Cells that remain when rows and columns at the rim with less than half of their points are gone."""
+    kept = np.ones(len(laid), dtype=np.bool_)
+    while kept.sum() > 1:
+        inside = laid[kept]
+        low, high = inside.min(axis=0), inside.max(axis=0)
+        ends = [(axis, int(end)) for axis in (0, 1) for end in (low[axis], high[axis])]
+        spans = high - low + 1
+        shares = [np.sum(inside[:, axis] == end) / (density * spans[1 - axis]) for axis, end in ends]
+        worst = int(np.argmin(shares))
+        if shares[worst] >= LEAST:
+            break
+        axis, end = ends[worst]
+        kept &= laid[:, axis] != end
+    return kept

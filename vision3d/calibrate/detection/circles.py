@@ -13,6 +13,7 @@ from vision3d.calibrate.detection.found import Found, NotFound
 from vision3d.calibrate.detection.lattice import Array, Ids
 from vision3d.calibrate.detection.ordering import Cells, turned_towards
 from vision3d.calibrate.detection.refine import FLOOR_PX, INFLATION, LOOSE, Refined
+from vision3d.calibrate.detection.search import enlarged, scales
 from vision3d.calibrate.detection.smooth import fit_smooth
 
 __all__ = ["find_circle_grid"]
@@ -33,16 +34,20 @@ def find_circle_grid(grey: Grey, board: CircleGrid) -> Found | NotFound:
     computed from the grid itself and taken out.
     """
     seen = (0, 0)
-    for dark in (True, False):
-        for lattice in find_lattices(grey, board, dark=dark):
-            if not lattice.ways:
-                seen = max(seen, lattice.size, key=lambda size: size[0] * size[1])
-                continue
-            way = turned_towards(lattice.ways)
-            if len(way.cells) >= FILLED * board.count:
-                found = _settled(grey, way, board, "dark circles" if dark else "light circles")
-                if found is not None:
-                    return found
+    for image, scale in scales(grey):
+        for dark in (True, False):
+            for lattice in find_lattices(image, board, dark=dark):
+                if not lattice.ways:
+                    seen = max(seen, lattice.size, key=lambda size: size[0] * size[1])
+                    continue
+                way = turned_towards(lattice.ways)
+                if len(way.cells) >= FILLED * board.count:
+                    way = Cells(enlarged(way.pixels, scale), way.cells, way.shape)
+                    found = _settled(grey, way, board, "dark circles" if dark else "light circles")
+                    if found is not None:
+                        return found
+        if seen[0] * seen[1] >= 0.5 * board.count:
+            break
     return NotFound(seen if min(seen) >= 2 else None)
 
 

@@ -19,7 +19,7 @@ __all__ = ["find_grids"]
 
 Array = NDArray[np.float64]
 
-CANDIDATES, SEEDS = 1500, 12
+CANDIDATES, TRIES, GRIDS = 1500, 80, 8
 RING, RADIUS_PX = 32, 5.0
 SYMMETRY = 0.35
 """Share of the ring's light that may differ between opposite points."""
@@ -56,8 +56,8 @@ def find_grids(grey: NDArray[np.uint8], blur_px: float = 1.5) -> list[Grid]:
     candidates = _candidates(grey, blur_px)
     free = np.ones(len(candidates.pixels), dtype=np.bool_)
     grids: list[Grid] = []
-    for seed in np.argsort(-candidates.strength)[: 20 * SEEDS]:
-        if not free[seed] or len(grids) >= SEEDS:
+    for seed in np.argsort(-candidates.strength)[:TRIES]:
+        if not free[seed] or len(grids) >= GRIDS:
             continue
         cells = _grow(candidates, int(seed), free)
         if len(cells) >= SMALLEST:
