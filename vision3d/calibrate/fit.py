@@ -12,6 +12,7 @@ from sequential.errors import DataError, ModelError
 from sequential.manifold.quaternion import quaternion_from_matrix
 from vision3d.calibrate.adjustment import Solution, Unknowns, adjust
 from vision3d.calibrate.calibration import Calibration
+from vision3d.calibrate.flatness import with_flatness
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.result import result_of
 from vision3d.calibrate.robust import fit_robustly, weights_of, weights_of_views
@@ -80,7 +81,8 @@ def calibrate(
     begun = _grow(problem, views, lens, start, robust=robust)
     free = np.ones(len(begun.unknowns.parameters) + 2, dtype=bool)
     free[-2:] = board_warp
-    return result_of(views, problem, fit_robustly(problem, begun, free, robust=robust), free)
+    found = result_of(views, problem, fit_robustly(problem, begun, free, robust=robust), free)
+    return found if board_warp else with_flatness(found)
 
 
 def _check(views: tuple[View, ...], lens: str) -> None:

@@ -29,8 +29,8 @@ CANDIDATES = ("pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "t
 """Lenses that are tried by default."""
 AS_GOOD = 1.005
 """Lenses whose held-out error is within this factor of the best are as good: the simplest of them wins."""
-MOST_FOLDS = 30
-"""With more views, several are held out at a time."""
+MOST_FOLDS, FOLDS_OF_MANY, MANY = 30, 10, 60
+"""With more than 30 views several are held out at a time, with more than 60 a tenth of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,8 @@ def _with_weights(
 
 
 def _score(found: Calibration, problem: Problem, weights: Array, offset: float) -> LensScore:
-    squares, _ = held_out_squares(problem, found, weights, folds_of(found.views, MOST_FOLDS))
+    most = MOST_FOLDS if len(found.views) <= MANY else FOLDS_OF_MANY
+    squares, _ = held_out_squares(problem, found, weights, folds_of(found.views, most))
     full = weights == 1.0
     own = np.sum(np.concatenate(found.residuals) ** 2, axis=1)
     return LensScore(

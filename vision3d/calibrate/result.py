@@ -44,7 +44,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     groups = groups_of(views)
     known = covariances(solution.blocks, free, scale, groups)
     p, follows = len(unknowns.parameters), known.pose_follows
-    focal = float((np.sqrt(np.diag(known.independent)[:2]) / unknowns.parameters[:2]).max())
+    focal = float((np.sqrt(np.diag(known.joint)[:2]) / unknowns.parameters[:2]).max())
     if not focal < FREE_FOCAL:
         raise UnderConstrainedError(_missing(problem, unknowns.poses, focal))
     camera = Camera(unknowns.lens, unknowns.parameters[:4], unknowns.parameters[4:], problem.size)

@@ -155,6 +155,8 @@ def test_a_bent_board_is_measured():
     assert bent.rms_px < 0.8 * flat.rms_px
     assert np.all(np.abs(bent.warp - [0.0004, -0.0003]) < 4.0 * bent.warp_std)
     assert np.all(np.abs(bent.camera.parameters - scene.camera.parameters) < 4.5 * bent.std)
+    assert any("a bent board explains" in finding for finding in flat.report.findings)
+    assert not any("bent board" in finding for finding in bent.report.findings)
     assert not flat.warp.any()
     assert not flat.warp_std.any()
 
