@@ -41,9 +41,10 @@ def with_flatness(found: Calibration) -> Calibration:
     axis = int(np.argmax(np.abs(warp) / std))
     if abs(warp[axis]) < BENT * std[axis]:
         return found
+    rise, spread = 1e3 * abs(warp[axis]), 1e3 * std[axis]
     words = (
         f"a bent board explains a part of what is left: along its {'columns' if axis else 'rows'} the middle "
-        f"stands {1e3 * abs(warp[axis]):.2f} ± {1e3 * std[axis]:.2f} mm off the ends; glue it to a rigid plate "
+        f"stands {rise:.2f} ± {spread:.2f} mm off the ends; glue it to a rigid plate "
         "(in Python, calibrate(…, board_warp=True) takes the bend into account)"
     )
     return replace(found, report=replace(found.report, findings=(*found.report.findings, words)))
