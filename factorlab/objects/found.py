@@ -177,9 +177,11 @@ def _pieces(
     """Connected pieces of every class but the first, which is the background."""
     found = network.segment(image)
     items: list[Item] = []
-    shares = {}
+    shares: dict[str, float] = {}
+    numbers: dict[str, int] = {}
     for label in sorted({int(one) for one in np.unique(found.labels)}):
         shares[found.name(label)] = float(np.mean(found.labels == label))
+        numbers[found.name(label)] = label
         if label == 0:
             continue
         inside = found.mask(label, least_confidence=settings.least_score)
@@ -193,7 +195,8 @@ def _pieces(
     items.sort(key=lambda one: -(one.area or 0))
     limits = {"least_score": settings.least_score, "least_area": settings.least_area}
     mask = np.minimum(found.labels, 255).astype(np.uint8)
-    return Found(picture, image, "map", tuple(items), mask, facts=facts | {"shares": shares}, limits=limits)
+    facts |= {"shares": shares, "numbers": numbers}
+    return Found(picture, image, "map", tuple(items), mask, facts=facts, limits=limits)
 
 
 def _item(name: str, pieces: Components, k: int, score: float) -> Item:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -28,15 +29,16 @@ def picture_with_objects(found: Found) -> Figure:
     height, width = image.shape[:2]
     step = max(1, -(-max(height, width) // LARGEST))
     columns = 1 if found.mask is None else 2
-    tall = min(11.0 / columns * height / width + 0.4, 8.0)
+    names = list(dict.fromkeys(one.name for one in found.items))
+    tall = min(11.0 / columns * height / width + (1.0 if len(names) > 1 else 0.6), 8.5)
     figure, axes = blank(tall, 1, columns)
     extent = (-0.5, width - 0.5, height - 0.5, -0.5)
     first = axes[0, 0]
     first.imshow(image[::step, ::step], extent=extent)
-    names = list(dict.fromkeys(one.name for one in found.items))
+    paints = _paints(found, names)
     edge = [patheffects.withStroke(linewidth=3.0, foreground="white")]
     for k, one in enumerate(found.items, 1):
-        colour = COLOURS[names.index(one.name) % len(COLOURS)]
+        colour = paints[one.name]
         left, top, wide, high = one.box
         first.add_patch(
             Rectangle(
@@ -52,9 +54,7 @@ def picture_with_objects(found: Found) -> Figure:
             )  # fmt: skip
     first.set(xlim=extent[:2], ylim=extent[2:], title="picture", xlabel="x, px", ylabel="y, px")
     if len(names) > 1:
-        handles = [
-            Rectangle((0, 0), 1, 1, color=COLOURS[k % len(COLOURS)]) for k in range(min(len(names), 6))
-        ]
+        handles = [Rectangle((0, 0), 1, 1, color=paints[name]) for name in names[:6]]
         figure.legend(handles, names[:6], loc="outside lower center", ncols=6)
     if found.mask is not None:
         second = axes[0, 1]
@@ -63,11 +63,20 @@ def picture_with_objects(found: Found) -> Figure:
             second.imshow(drawn, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
             second.set(title="pixels of the colour, cleaned")
         else:
-            shown = np.where(drawn > 0, (drawn.astype(int) - 1) % 10, -1)
-            masked = np.ma.masked_less(shown, 0)
-            second.imshow(masked, cmap="tab10", vmin=0, vmax=9, extent=extent, interpolation="nearest")
+            masked = np.ma.masked_less(np.where(drawn > 0, (drawn.astype(int) - 1) % len(COLOURS), -1), 0)
+            paint = ListedColormap(COLOURS)
+            second.imshow(masked, cmap=paint, vmin=0, vmax=5, extent=extent, interpolation="nearest")
             second.set(title="classes of pixels, background white")
         second.set(xlabel="x, px")
         second.grid(visible=False)
     first.grid(visible=False)
     return figure
+
+
+def _paints(found: Found, names: list[str]) -> dict[str, str]:
+    """A colour for each name, that of its class's number where the mask is drawn by numbers."""
+    numbers = found.facts.get("numbers", {})
+    return {
+        name: COLOURS[(numbers[name] - 1 if name in numbers else k) % len(COLOURS)]
+        for k, name in enumerate(names)
+    }

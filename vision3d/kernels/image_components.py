@@ -7,10 +7,10 @@ from vision3d.kernels import kernel
 
 __all__ = ["breadth_first", "measure", "renumber", "two_passes"]
 
-u8, i32 = nb.uint8[:, ::1], nb.int32[:, ::1]
+read, i32 = nb.types.Array(nb.uint8, 2, "C", readonly=True), nb.int32[:, ::1]
 
 
-@kernel(nb.int64(u8, nb.boolean, i32))
+@kernel(nb.int64(read, nb.boolean, i32))
 def breadth_first(mask, diagonals, labels):
     """Label components in the order of their first pixels; returns how many there are.
 
@@ -45,7 +45,7 @@ def breadth_first(mask, diagonals, labels):
     return count
 
 
-@kernel(nb.int64(u8, nb.boolean, i32))
+@kernel(nb.int64(read, nb.boolean, i32))
 def two_passes(mask, diagonals, labels):
     """The same: provisional labels by row, equal ones united in a forest, then the final ones.
 

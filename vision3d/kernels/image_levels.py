@@ -7,10 +7,11 @@ from vision3d.kernels import kernel
 
 __all__ = ["adaptive", "histogram", "look_up"]
 
-u8, i32 = nb.uint8[:, ::1], nb.int32[:, ::1]
+u8 = nb.uint8[:, ::1]
+read = nb.types.Array(nb.uint8, 2, "C", readonly=True)
 
 
-@kernel(nb.void(u8, nb.int64[::1]))
+@kernel(nb.void(read, nb.int64[::1]))
 def histogram(image, counts):
     """How many pixels have each of the 256 levels.  Four tables, so that equal neighbours do not wait."""
     tables = np.zeros((4, 256), np.int64)
@@ -29,7 +30,7 @@ def histogram(image, counts):
         counts[level] = tables[0, level] + tables[1, level] + tables[2, level] + tables[3, level]
 
 
-@kernel(nb.void(u8, u8, nb.int64, nb.uint8, nb.uint8, u8))
+@kernel(nb.void(read, u8, nb.int64, nb.uint8, nb.uint8, u8))
 def adaptive(image, mean, below, above, otherwise, out):
     """`above` where a pixel exceeds the mean around it by more than `below`, `otherwise` elsewhere."""
     height, width = image.shape
@@ -39,7 +40,7 @@ def adaptive(image, mean, below, above, otherwise, out):
             out[y, x] = above if brighter else otherwise
 
 
-@kernel(nb.void(u8, nb.uint8[::1], u8))
+@kernel(nb.void(read, nb.uint8[::1], u8))
 def look_up(image, table, out):
     """out = table[image]."""
     height, width = image.shape
