@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sequential.manifold import SE3
 from sequential.manifold.quaternion import quaternion_exp, quaternion_multiply, rotate
 from vision3d.camera import Camera
 from vision3d.markers import marker_corners
@@ -30,3 +31,11 @@ def tilted(side_px, tilt_deg, rng, camera=PINHOLE, size_m=SIZE_M, at=(0.0, 0.0))
 def corners_of(camera, camera_T_marker, size_m=SIZE_M):
     """Exact pixels of the four corners."""
     return camera.project(rotate(camera_T_marker[:4], marker_corners(size_m)) + camera_T_marker[4:])
+
+
+def swaying(rng, side_px=32.0):
+    """A marker that turns smoothly about tilts at which one picture decides little."""
+    start = tilted(side_px, 25.0, rng)
+    phase, rate = rng.uniform(0.0, 2.0 * np.pi, 3), np.array([2.0, 2.7, 1.3])
+    size = np.array([0.25, 0.25, 0.1])
+    return lambda t: SE3().retract(start, np.concatenate([size * np.sin(rate * t + phase), np.zeros(3)]))

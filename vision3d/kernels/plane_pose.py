@@ -26,7 +26,7 @@ from vision3d.kernels import inlined, kernel
 
 __all__ = ["cholesky", "descend", "normal_equations", "rotate_right", "two_minima"]
 
-ITERATIONS = 60
+ITERATIONS = 100
 SAME = 1e-3  # minima closer than this (rad) and than a twentieth of a sigma are one
 
 
@@ -160,7 +160,7 @@ def descend(R, t, X, n, A, W, first, iterations, enough, rows, H):
     chi2 = normal_equations(R, t, X, n, A, W, rows, H, g)
     if not chi2 < math.inf:
         return math.inf
-    damping = 0.0 if first else 1e-6
+    damping = 0.0 if first else 1e-3
     for _ in range(iterations):
         if math.isnan(cholesky(H, first, damping, L)):
             damping = max(10.0 * damping, 1e-6)
@@ -208,31 +208,56 @@ def mirrored(R, t, out):
     out[2, 2] = out[0, 0] * out[1, 1] - out[1, 0] * out[0, 1]
 
 
+@inlined
+def settle(R, t, X, n, A, W, rows, H):
+    """Descend to the nearest minimum: the normal first stays as it is, then everything moves."""
+    chi2 = descend(R, t, X, n, A, W, 2, 12, 1e-4, rows, H)
+    return descend(R, t, X, n, A, W, 0, ITERATIONS, 1e-10, rows, H) if chi2 < math.inf else math.inf
+
+
+@inlined
+def exchange(R, t, chi2, H):
+    """Put the second minimum first."""
+    chi2[0], chi2[1] = chi2[1], chi2[0]
+    for i in range(3):
+        t[0, i], t[1, i] = t[1, i], t[0, i]
+        for j in range(3):
+            R[0, i, j], R[1, i, j] = R[1, i, j], R[0, i, j]
+    for i in range(6):
+        for j in range(6):
+            H[0, i, j], H[1, i, j] = H[1, i, j], H[0, i, j]
+
+
+@inlined
+def same_tilt(R):
+    """Whether two minima have one normal."""
+    cosine = R[0, 0, 2] * R[1, 0, 2] + R[0, 1, 2] * R[1, 1, 2] + R[0, 2, 2] * R[1, 2, 2]
+    return cosine > math.cos(SAME)
+
+
 @kernel("i8(f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[::1], f8[:,:,::1])")
 def two_minima(X, n, A, W, R, t, chi2, H):
-    """Descend from R[0], t[0], and from the mirror image of what that gives; the better minimum comes first.
+    """Descend from R[0], t[0] and from its mirror image; the better minimum comes first.
 
     R (2, 3, 3), t (2, 3), chi2 (2,) and H (2, 6, 6) are filled; returns how many minima there are.
     """
     rows = np.empty((2 * W.shape[1], 7))
-    chi2[0] = descend(R[0], t[0], X, n, A, W, 0, ITERATIONS, 1e-10, rows, H[0])
-    if not chi2[0] < math.inf:
-        return 0
     mirrored(R[0], t[0], R[1])
-    t[1] = t[0]
-    chi2[1] = descend(R[1], t[1], X, n, A, W, 2, 8, 1e-4, rows, H[1])
-    if chi2[1] < math.inf:
-        chi2[1] = descend(R[1], t[1], X, n, A, W, 0, ITERATIONS, 1e-10, rows, H[1])
-    if not chi2[1] < math.inf:
-        return 1
-    if chi2[1] < chi2[0]:
+    for i in range(3):
+        t[1, i] = t[0, i]
+    for m in range(2):
+        chi2[m] = settle(R[m], t[m], X, n, A, W, rows, H[m])
+    for _ in range(2):  # the first starts may have led to one place: mirror what is better once more
+        if chi2[1] < chi2[0]:
+            exchange(R, t, chi2, H)
+        if not chi2[0] < math.inf:
+            return 0
+        if chi2[1] < math.inf and not same_tilt(R):
+            return 2
+        mirrored(R[0], t[0], R[1])
         for i in range(3):
-            t[0, i], t[1, i] = t[1, i], t[0, i]
-            for j in range(3):
-                R[0, i, j], R[1, i, j] = R[1, i, j], R[0, i, j]
-        for i in range(6):
-            for j in range(6):
-                H[0, i, j], H[1, i, j] = H[1, i, j], H[0, i, j]
-        chi2[0], chi2[1] = chi2[1], chi2[0]
-    cosine = R[0, 0, 2] * R[1, 0, 2] + R[0, 1, 2] * R[1, 1, 2] + R[0, 2, 2] * R[1, 2, 2]
-    return 1 if cosine > math.cos(SAME) else 2
+            t[1, i] = t[0, i]
+        chi2[1] = settle(R[1], t[1], X, n, A, W, rows, H[1])
+    if chi2[1] < chi2[0]:
+        exchange(R, t, chi2, H)
+    return 1 if same_tilt(R) or not chi2[1] < math.inf else 2

@@ -37,6 +37,8 @@ __all__ = ["CERTAIN", "MarkerPose", "Mode", "marker_corners", "marker_pose", "ma
 Array = NDArray[np.float64]
 CERTAIN = 20.0
 """Odds above which the other reading is left out of account."""
+SHADE = 0.9
+"""The sigma of corners is known to 5 % at best: odds are those of a sigma so much larger."""
 LEAST = 1e-6
 """No reading is less probable beside the other: a bent or half hidden marker says less."""
 
@@ -176,7 +178,7 @@ def marker_poses(
 
 def pose_of_modes(found: FlatModes, size: float = 1.0) -> MarkerPose:
     """Order what the kernel found by probability, in units of `size` metres."""
-    weights = np.maximum(np.exp(found.log_z - found.log_z.max()), LEAST)
+    weights = np.maximum(np.exp(SHADE * (found.log_z - found.log_z.max())), LEAST)
     weights /= weights.sum()
     scale = np.array([1.0, 1.0, 1.0, size, size, size])
     covs, stretch = found.covs * np.outer(scale, scale), np.concatenate([np.ones(4), scale[3:]])

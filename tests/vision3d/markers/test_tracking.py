@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from marker_worlds import PINHOLE, SIZE_M, corners_of, tilted
+from marker_worlds import PINHOLE, SIZE_M, corners_of, swaying, tilted
 
 from sequential.errors import TimeOrderError
 from sequential.manifold import SE3
@@ -15,14 +15,6 @@ FPS = 25.0
 
 def seen(pose, rng, number=7, sigma=SIGMA_PX):
     return Marker(number, corners_of(PINHOLE, pose) + rng.normal(0.0, sigma, (4, 2)), sigma)
-
-
-def swaying(rng, side_px=32.0):
-    """A marker that turns smoothly about tilts at which one picture decides little."""
-    start = tilted(side_px, 25.0, rng)
-    phase, rate = rng.uniform(0.0, 2.0 * np.pi, 3), np.array([2.0, 2.7, 1.3])
-    size = np.array([0.25, 0.25, 0.1])
-    return lambda t: SE.retract(start, np.concatenate([size * np.sin(rate * t + phase), np.zeros(3)]))
 
 
 def is_wrong(pose, truth):
