@@ -7,7 +7,9 @@ from importlib import metadata
 
 __all__ = ["LIBRARIES", "versions"]
 
-LIBRARIES = ("numpy", "scipy", "numba", "gtsam", "matplotlib", "click", "jinja2")
+LIBRARIES = (
+    "numpy", "scipy", "numba", "gtsam", "opencv-python-headless", "matplotlib", "click", "jinja2",
+)  # fmt: skip
 
 
 def versions() -> dict[str, str]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from factorlab.camera.calibrated import CalibratedCamera
 from factorlab.camera.numbers import numbers_of
 from factorlab.camera.verdicts import verdicts_of
 from factorlab.report.document import Document, Section, Table
+
+Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +34,10 @@ COVERAGE_READ = (
 LENSES_TOLD = (
     "Every lens model is fitted to all pictures, and to all but one in turn; the picture left out is then "
     "predicted. Of models that predict equally well (within 1 %), the one with fewest coefficients is taken."
+)
+DETECTION_TOLD = (
+    "Every corner is refined in a window of at most 0.35 of the distance to its neighbour. The scatter about "
+    "a smooth surface of each picture's own stands beside what the noise of the pixels alone leads to expect."
 )
 DIFFERENCE_READ = (
     "The same ray through both cameras, once the second is turned to fit the first best: where the other "
@@ -70,12 +77,35 @@ def _sections(done: CalibratedCamera) -> list[Section]:
         Section("Residuals over the image", "", None, lambda: figures.residual_field(done), FIELD_READ),
         Section("Residuals and their σ", "", None, lambda: figures.residual_scatter(done), SCATTER_READ),
         Section("Views", "", _views(done), lambda: figures.view_errors(done), VIEWS_READ, page_only=True),
+        Section("Detection", DETECTION_TOLD, _detection(done), page_only=True),
         Section("Coverage", "", None, lambda: figures.coverage(done), COVERAGE_READ),
         Section("How sure a projection is", "", None, lambda: maps.uncertainty_map(done), UNCERTAINTY_READ),
         *_compared(done),
         Section("Corners to look at", "", None, lambda: _cutouts(done), CUTOUTS_READ),
         Section("Pictures", "", None, lambda: _thumbnails(done), PICTURES_READ),
     ]
+
+
+def _detection(done: CalibratedCamera) -> Table:
+    """What the audit of every picture says."""
+    rows = []
+    for audit in done.detections.audits:
+        figures = (audit.scatter_px, audit.noise_px, audit.blur_px, 2.0 * audit.contrast)
+        known = [float(value) if np.isfinite(value) else None for value in figures]
+        doubtful = len(audit.suspicious) + len(audit.moved)
+        spans = [_span(values) for values in (audit.spacing_px, audit.window_px)]
+        rows.append((audit.name, audit.finder, *spans, *known, doubtful, len(audit.lost)))
+    headings = (
+        "picture", "found by", ("apart", "px"), ("window, ±", "px"), ("scatter", "px"), ("noise", "px"),
+        ("blur", "px"), ("contrast", "grey levels"), "doubtful", "lost",
+    )  # fmt: skip
+    return Table(headings, tuple(rows))
+
+
+def _span(values: Array) -> str:
+    """From the smallest to the largest, in whole numbers."""
+    low, high = f"{values.min():.0f}", f"{values.max():.0f}"
+    return low if low == high else f"{low} – {high}"
 
 
 def _compared(done: CalibratedCamera) -> list[Section]:
@@ -130,7 +160,7 @@ def _views(done: CalibratedCamera) -> Table:
         held = None if done.cross is None else float(done.cross.view_rms[k])
         rows.append(
             (
-                view.name, len(view), left_out or None, float(fit.view_rms[k]), held,
+                view.name, len(view), left_out, float(fit.view_rms[k]), held,
                 float(np.degrees(done.tilts[k])), float(done.distances[k]), "; ".join(view.findings),
             )
         )  # fmt: skip

@@ -68,9 +68,10 @@ def _corners(done: CalibratedCamera) -> list[Verdict]:
     status: Status = "PASS" if share <= 0.01 else "WARN" if share <= 0.1 else "FAIL"
     if not lost:
         return [Verdict("corners left out", 0, None, "PASS", f"noise explains all of {total}")]
-    pictures = list(dict.fromkeys(fit.views[view].name for view, _ in fit.outliers))
-    where = f"{', '.join(pictures[:4])}{' …' if len(pictures) > 4 else ''}"
-    meaning = f"of {total}, in {where}: noise does not explain them"
+    columns = max(1, done.settings.board.shape[0])
+    named = [f"{fit.views[k].name} ({i % columns}, {i // columns})" for k, i in fit.outliers]
+    where = f"{', '.join(named[:6])}{' …' if len(named) > 6 else ''}"
+    meaning = f"of {total}, which noise does not explain: {where}"
     action = "look at their cut-outs in the report: glare, a finger, blur" if status != "PASS" else ""
     return [Verdict("corners left out", lost, None, status, meaning, action)]
 
