@@ -124,10 +124,10 @@ def box_sums(
             integral[1:, 1:] = padded.cumsum(axis=0, dtype=kind).cumsum(axis=1, dtype=kind)
             top, bottom = integral[:-size], integral[size:]
             return bottom[:, size:] - bottom[:, :-size] - top[:, size:] + top[:, :-size]
-        from vision3d.kernels import image_filters
+        from vision3d.kernels import image_boxes
 
         sums = np.empty(channel.shape, kind)
-        image_filters.box_sums(padded, size, sums)
+        image_boxes.box_sums(padded, size, sums)
         return sums
 
     return per_channel(pixels, one)
@@ -139,7 +139,13 @@ def box_blur(
     """The mean over the size by size window around every pixel, of the image's type."""
     pixels = as_image(image)
     sums = box_sums(pixels, size, border=border, backend=backend)
-    return saturate(sums * (1.0 / size**2), pixels.dtype)
+    if pixels.dtype != np.uint8 or pixels.ndim != 2 or backend == "numpy":
+        return saturate(sums * (1.0 / size**2), pixels.dtype)
+    from vision3d.kernels import image_boxes
+
+    mean = np.empty(pixels.shape, np.uint8)
+    image_boxes.means(sums, 1.0 / size**2, mean)
+    return mean
 
 
 def arithmetic(pixels: np.dtype, weights: NDArray[np.generic], result: np.dtype) -> np.dtype:

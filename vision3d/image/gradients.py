@@ -111,13 +111,13 @@ def sobel(
     row, column = len(along_y) // 2, len(along_x) // 2
 
     def one(channel: Image) -> Image:
-        from vision3d.kernels import image_filters
+        from vision3d.kernels import image_separable
 
         padded = pad(channel, row, row, column, column, border)
         if work.kind == "f":
             padded = padded.astype(work, copy=False)
         out = np.empty(channel.shape, work)
-        image_filters.separable(padded, along_x.astype(work), along_y.astype(work), out)
+        image_separable.separable(padded, along_x.astype(work), along_y.astype(work), out)
         return saturate(out, kind)
 
     return per_channel(pixels, one)

@@ -91,11 +91,11 @@ def _separable(pixels: Image, along: Image, border: Border, backend: Backend) ->
     half = len(along) // 2
 
     def one(channel: Image) -> Image:
-        from vision3d.kernels import image_filters
+        from vision3d.kernels import image_separable
 
         out = np.empty_like(channel)
         padded = pad(channel, half, half, half, half, border)
-        image_filters.separable(padded, along, along, out)
+        image_separable.separable(padded, along, along, out)
         return out
 
     return per_channel(pixels, one)
@@ -128,10 +128,10 @@ def _bytes(pixels: Image, taps: NDArray[np.uint16], border: Border, backend: Bac
                 total += tap * rows[j : j + h]
             rounded: Image = ((total + (1 << 15)) >> 16).astype(np.uint8)
             return rounded
-        from vision3d.kernels import image_filters
+        from vision3d.kernels import image_separable
 
         out = np.empty(channel.shape, np.uint8)
-        image_filters.separable_fixed(padded, taps, taps, out)
+        image_separable.separable_fixed(padded, taps, taps, out)
         return out
 
     return per_channel(pixels, one)
