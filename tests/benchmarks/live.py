@@ -3,7 +3,8 @@
 `python live.py [--json] [--quick]`.  The server is the command as a user starts it, in a process of its own;
 this one takes the pictures as a browser does and notes when each came.  Frames a second are pictures that
 arrived while the video was played as quickly as possible, decoding, task, marks and JPEG included; latency
-runs from a frame's arrival at the server to its picture being here, while the video plays at its own speed.
+runs from a frame's arrival at the server to its picture being here, and where there is a browser, to its
+picture being on a canvas there, while the video plays at its own speed.
 Ends with exit code 3 when a must is missed.
 """
 
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from measure.figures import Figure, publish, say
+from measure.live_browser import browser_latency_ms, numbered
 from measure.live_client import served
 
 from vision3d.boards import Checkerboard
@@ -38,6 +40,7 @@ def videos(folder: Path, seconds: float) -> dict[str, Path]:
     return {
         "markers": write_video(folder / "markers.avi", markers, FPS),
         "markers60": write_video(folder / "markers60.avi", markers, 2.0 * FPS),
+        "numbered": write_video(folder / "numbered.avi", numbered(markers), FPS),
         "board": write_video(folder / "board.avi", (frame.image for frame in board), FPS),
     }
 
@@ -84,6 +87,13 @@ def main() -> int:
             figures[f"latency_{rate}_ms"] = Figure(median, "ms", "median", 100.0)
             figures[f"latency_{rate}_high_ms"] = Figure(high, "ms", "95 % are below", 100.0)
             figures[f"arrived_{rate}_fps"] = Figure(arrived, "1/s", f"of {rate}", 25.0, better="higher")
+        say("latency up to a browser's canvas")
+        with served(video["numbered"], "--loop", "--task", "markers", *pose) as page:
+            ages = browser_latency_ms(page, round((2.0 if quick else 6.0) * FPS), seconds)
+        if ages is not None:
+            median, high = np.percentile(ages, [50, 95])
+            figures["latency_browser_ms"] = Figure(median, "ms", "Chromium, at 30 frames a second", 100.0)
+            figures["latency_browser_high_ms"] = Figure(high, "ms", "95 % are below")
         for task in TASKS:
             say(f"{task}, as quickly as possible")
             source = video["board"] if task == "calibrate" else video["markers"]

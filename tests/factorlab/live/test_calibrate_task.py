@@ -195,3 +195,16 @@ def test_in_the_browser(window, live, held, tmp_path):
     assert "saved to" in window.run("notes.textContent")
     found = window.run("fetch('/files/report.html').then((answer) => answer.text())")
     assert found.startswith("<!DOCTYPE html>")
+
+
+@pytest.mark.parametrize("board", BOARDS[1:], ids=lambda board: board.kind)
+def test_other_boards_are_taken_as_well(board, tmp_path, rng):
+    task = CalibrateTask(board, "brown2", tmp_path)
+    try:
+        poses = board_poses(CAMERA, board, 5, rng, tilt_rad=(0.3, 0.7), fill=(0.4, 0.85))
+        hold(task, [picture(pose, rng, board) for pose in poses])
+        standing = task.desk.now
+        assert len(standing.views) >= 4, standing.fault
+        assert standing.calibration.camera.intrinsics[:2] == pytest.approx(CAMERA.intrinsics[:2], rel=0.03)
+    finally:
+        task.close()

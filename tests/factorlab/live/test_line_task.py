@@ -36,9 +36,9 @@ def test_offset_and_heading_are_the_true_ones(offset_px, heading_deg, rng):
 
 def test_the_headline_says_where_it_is_and_where_it_leads(rng):
     task = LineTask()
-    assert task.read(view(-64, 0.0, rng)).headline == "line 40 % to the left, leading straight on"
-    assert task.read(view(0, 0.3, rng)).headline == "line in the middle, leading to the right"
-    assert task.read(view(48, -0.3, rng)).headline == "line 30 % to the right, leading to the left"
+    assert task.read(view(-64, 0.0, rng)).headline == "line 40 % left, straight on"
+    assert task.read(view(0, 0.3, rng)).headline == "line in the middle, bears right"
+    assert task.read(view(48, -0.3, rng)).headline == "line 30 % right, bears left"
 
 
 def test_the_spread_is_that_of_many_frames(rng):
@@ -58,7 +58,7 @@ def test_a_scene_without_a_line_says_why(rng):
     assert (reading.headline, reading.state) == ("no line", "idle")
     assert reading.notes[0]
     assert reading.rows[0]["found"] == 0
-    assert reading.to_json()["traces"] == {"offset": None, "heading, °": None}
+    assert reading.to_json()["traces"] == {"offset, %": None, "to the right, °": None}
 
 
 def test_what_is_looked_for_is_changed_by_a_button(rng):
@@ -88,4 +88,4 @@ def test_metres_on_the_ground_are_the_true_ones(rng):
     row = reading.rows[0]
     assert row["left_m"] == pytest.approx(0.06, abs=max(5 * row["left_sigma_m"], 1e-3))
     assert row["ground_heading_deg"] == pytest.approx(0.0, abs=1.0)
-    assert [one.name for one in reading.numbers][:2] == ["line is to the left", "leads to the left"]
+    assert [one.name for one in reading.numbers][:2] == ["line on the left by", "leading left by"]

@@ -26,7 +26,9 @@ export function fill(place, list, make) {
 
 export function quantity({ value, unit, digits, sigma }) {
   if (value === null) return ["–"];
-  const text = value.toFixed(digits) + (sigma === null ? "" : ` ± ${sigma.toFixed(digits)}`);
+  // one digit of σ that is not zero says how far the value's digits mean something
+  const fine = sigma > 0 ? Math.min(5, Math.max(digits, Math.ceil(-Math.log10(sigma)))) : digits;
+  const text = value.toFixed(fine) + (sigma === null ? "" : ` ± ${sigma.toFixed(fine)}`);
   return unit ? [text, " ", element("small", {}, unit)] : [text];
 }
 

@@ -62,14 +62,14 @@ class LineTask(Task):
             "idle" if not found.found else "good" if found.confidence >= SURE else "warn",
             numbers=(
                 *_metres(place),
-                Number("offset", finite(found.offset), "of half the width", 3, finite(sigmas[0])),
-                Number("heading", finite(angle), "° to the right", 1, finite(np.degrees(sigmas[1]))),
+                Number("offset in the image", finite(100 * found.offset), "%", 1, finite(100 * sigmas[0])),
+                Number("to the right in it", finite(angle), "°", 1, finite(np.degrees(sigmas[1]))),
                 Number("confidence", found.confidence, "", 2),
                 Number("width", finite(found.width_px), "px", 1),
                 Number("seen in", 100.0 * self._found / self._frames, "% of the frames", 0),
             ),
             tables=(_reasons(found),) if found.parts else (),
-            traces={"offset": finite(found.offset), "heading, °": finite(angle)},
+            traces={"offset, %": finite(100 * found.offset), "to the right, °": finite(angle)},
             marks=_marks(found, frame.image.shape),
             notes=(found.reason,) if found.reason else (),
             rows=(self._row(found, sigmas, place),),
@@ -124,8 +124,8 @@ def _metres(place: GroundReading | None) -> tuple[Number, ...]:
     left, turn = np.sqrt(np.diag(place.cov)).tolist()
     heading = float(np.degrees(place.heading_rad))
     return (
-        Number("line is to the left", 1e3 * place.offset_m, "mm", 1, 1e3 * left),
-        Number("leads to the left", heading, "°", 1, float(np.degrees(turn))),
+        Number("line on the left by", 1e3 * place.offset_m, "mm", 1, 1e3 * left),
+        Number("leading left by", heading, "°", 1, float(np.degrees(turn))),
     )
 
 
@@ -149,9 +149,9 @@ def _headline(found: LineReading) -> str:
         return "no line"
     side = "left" if found.offset < 0 else "right"
     degrees = np.degrees(found.heading_rad)
-    leads = "straight on" if abs(degrees) < 3 else f"to the {'right' if degrees > 0 else 'left'}"
-    where = "in the middle" if abs(found.offset) < 0.05 else f"{100 * abs(found.offset):.0f} % to the {side}"
-    return f"line {where}, leading {leads}"
+    leads = "straight on" if abs(degrees) < 3 else f"bears {'right' if degrees > 0 else 'left'}"
+    where = "in the middle" if abs(found.offset) < 0.05 else f"{100 * abs(found.offset):.0f} % {side}"
+    return f"line {where}, {leads}"
 
 
 def _reasons(found: LineReading) -> Table:
