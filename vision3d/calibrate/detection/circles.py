@@ -12,7 +12,7 @@ from vision3d.calibrate.detection.conics import circle_images
 from vision3d.calibrate.detection.found import Found, NotFound
 from vision3d.calibrate.detection.lattice import Array, Ids
 from vision3d.calibrate.detection.ordering import Cells, turned_towards
-from vision3d.calibrate.detection.refine import FLOOR_PX, INFLATION, LOOSE, Refined
+from vision3d.calibrate.detection.refine import FLOOR_PX, LOOSE, Refined
 from vision3d.calibrate.detection.search import enlarged, scales
 from vision3d.calibrate.detection.smooth import fit_smooth
 
@@ -90,7 +90,7 @@ def _fitted(grey: Grey, starts: Array, ids: Ids, board: CircleGrid) -> tuple[Ref
         fit_discs(image, np.ascontiguousarray(at + bias), shapes, outer, centres, covs, facts)
         good = _believable(facts, shapes)
         at = np.where(good[:, None], centres - bias, at)
-    sigma = np.sqrt(INFLATION**2 * 0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2)
+    sigma = np.sqrt(0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2)
     at[~good], sigma[~good] = np.nan, np.nan
     det = np.maximum(facts[:, 5] * facts[:, 7] - facts[:, 6] ** 2, 1e-12)
     reach = (outer - 1.0) / np.sqrt(np.sqrt(det))

@@ -51,12 +51,14 @@ def detect_views(
     Raises
     ------
     ModelError
-        if the window is no positive whole number.
+        if the window is no positive whole number, or the board has circles.
     ShapeError
         if an image is no image.
     """
     if window is not None and (not isinstance(window, int) or window < 1):
         raise ModelError(f"a window is a whole number of pixels, at least 1, to each side; got {window!r}")
+    if window is not None and isinstance(board, CircleGrid):
+        raise ModelError("a window is for corners, and circles have none: leave --window out")
     outcomes: list[Outcome] = []
     for name, outcome in _each(images, board, window, workers or os.cpu_count() or 1):
         outcomes.append(outcome)

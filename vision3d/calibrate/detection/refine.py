@@ -15,8 +15,8 @@ HALF = 0.35
 """Half-width of a window in spacings: beyond it the neighbouring corners pull (see docs/camera.md)."""
 REACH_PX, SHARP_PX = 8.0, 1.6
 """Largest radius of a window, and the blur up to which it is enough."""
-INFLATION, FLOOR_PX = 1.06, 0.002
-"""From the scatter of the pixels to that of corners on rendered truth: tests/vision3d/calibrate/detection."""
+FLOOR_PX = 0.002
+"""What is left of a corner where the pixels have no noise: 8 bits, edges that are not quite as modelled."""
 LOOSE = 0.6
 """Residual of the fit, relative to the contrast, beyond which a place is no corner."""
 
@@ -83,7 +83,7 @@ def refine_saddles(
         axes, bends = lattice_axes(start, ids, shape), edge_bends(start, ids, shape)
         fit_saddles(image, start, axes, bends, HALF, inset, reach, corners, covs, facts)
         good = _believable(np.asarray(pixels, dtype=np.float64), corners, facts, axes)
-    sigma = np.sqrt(INFLATION**2 * 0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2)
+    sigma = np.sqrt(0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2)
     lost = ~good
     for array in (corners, sigma):
         array[lost] = np.nan

@@ -1,6 +1,6 @@
 """Whether the points of one view lie as the points of a board can: a plane seen through a radial distortion.
 
-The model has the eight numbers of a homography, three of a radial distortion, and its centre, expected
+The model has the eight numbers of a homography, four of a radial distortion, and its centre, expected
 near the middle of the image; fitted to the view alone, robustly, what is left of each corner is its residual.
 It needs no camera, so that it can be said of a single image.
 """
@@ -18,7 +18,7 @@ __all__ = ["Smooth", "fit_smooth"]
 
 RADIAL_FROM = 20
 """Points from which the distortion is fitted as well."""
-PLAIN_STEPS, STEPS = 12, 24
+STEPS, ROBUST_STEPS = 40, 8
 """Least squares to its end first: points that a half-way model cannot explain would lose their weight."""
 MOST_FREE = 0.9
 PRIOR_PX = 0.05
@@ -63,27 +63,52 @@ def fit_smooth(points: Array, pixels: Array, size: tuple[int, int]) -> Smooth | 
     flat = (points[:, :2] - origin) / unit
     middle, radius = 0.5 * (np.array(size, dtype=np.float64) - 1.0), 0.5 * float(np.hypot(*size))
     target = (pixels - middle) / radius
-    free = 13 if n >= RADIAL_FROM else 8
-    q = np.concatenate([_homography(flat, target), np.zeros(5)])
-    weights = np.ones(n)
+    free = 14 if n >= RADIAL_FROM else 8
+    q = np.concatenate([_homography(flat, target), np.zeros(6)])
     prior = np.zeros(free)
-    prior[11:] = (PRIOR_PX / radius / 0.25) ** 2
-    for step in range(STEPS):
-        r, J = _linearise(q, flat, target, free)
+    prior[8:] = (PRIOR_PX / radius / np.array([10.0, 10.0, 10.0, 10.0, 0.25, 0.25])[: free - 8]) ** 2
+    weights = np.ones(n)
+    q = _solved(q, flat, target, weights, prior)
+    for _ in range(ROBUST_STEPS):
+        r, _ = _linearise(q, flat, target, free)
         scale = max(_scale(r, n, free), 1e-7)
-        if step >= PLAIN_STEPS:
-            weights = _tukey(np.linalg.norm(r, axis=1) / (scale * 4.685))
-        A = np.einsum("n,nik,nil->kl", weights, J, J)
-        A[np.diag_indices(free)] *= 1.0 + 1e-9
-        A += np.diag(prior)
-        g = np.einsum("n,nik,ni->k", weights, J, r) - prior * q[:free]
-        q[:free] += np.linalg.lstsq(A, g, rcond=1e-14)[0]
+        weights = _tukey(np.linalg.norm(r, axis=1) / (scale * 4.685))
+        if weights.min() > 0.3:
+            break  # nothing sticks out
+        q = _solved(q, flat, target, weights, prior)
     r, J = _linearise(q, flat, target, free)
     inverse = np.linalg.pinv(np.einsum("n,nik,nil->kl", weights, J, J) + np.diag(prior), rcond=1e-14)
     hat = np.einsum("n,nik,kl,nil->n", weights, J, inverse, J) / 2.0
     return Smooth(
         r * radius, np.clip(hat, 0.0, MOST_FREE), _scale(r, n, free) * radius, q, origin, unit, middle, radius
     )
+
+
+def _solved(q: Array, xy: Array, target: Array, weights: Array, prior: Array) -> Array:
+    """Levenberg-Marquardt from q to the least of the weighted squares and the prior."""
+    free = len(prior)
+
+    def linearised(at: Array) -> tuple[Array, Array, float]:
+        r, J = _linearise(at, xy, target, free)
+        cost = float(np.einsum("n,ni,ni->", weights, r, r) + prior @ at[:free] ** 2)
+        return r, J, cost
+
+    r, J, cost = linearised(q)
+    damping = 1e-4
+    for _ in range(STEPS):
+        A = np.einsum("n,nik,nil->kl", weights, J, J) + np.diag(prior)
+        g = np.einsum("n,nik,ni->k", weights, J, r) - prior * q[:free]
+        tried = q.copy()
+        tried[:free] += np.linalg.solve(A + np.diag(damping * np.diag(A) + 1e-15), g)
+        r_new, J_new, new = linearised(tried)
+        if new <= cost:
+            q, r, J, damping = tried, r_new, J_new, max(0.1 * damping, 1e-9)
+            if cost - new <= 1e-6 * cost:
+                break
+            cost = new
+        elif (damping := 10.0 * damping) > 1e6:
+            break
+    return q
 
 
 def _homography(xy: Array, target: Array) -> Array:
@@ -104,24 +129,25 @@ def _linearise(q: Array, xy: Array, target: Array, free: int) -> tuple[Array, Ar
     x, y = xy.T
     depth = q[6] * x + q[7] * y + 1.0
     u, v = (q[0] * x + q[1] * y + q[2]) / depth, (q[3] * x + q[4] * y + q[5]) / depth
-    a, b = u - q[11], v - q[12]
+    a, b = u - q[12], v - q[13]
     rho = a * a + b * b
-    gain = 1.0 + rho * (q[8] + rho * (q[9] + rho * q[10]))
-    slope = 2.0 * (q[8] + rho * (2.0 * q[9] + 3.0 * rho * q[10]))
+    above, below = 1.0 + rho * (q[8] + rho * q[9]), np.maximum(1.0 + rho * (q[10] + rho * q[11]), 0.1)
+    gain = above / below
+    slope = 2.0 * (q[8] + 2.0 * rho * q[9] - gain * (q[10] + 2.0 * rho * q[11])) / below
     one, nil = np.ones_like(x), np.zeros_like(x)
     du = np.stack([x, y, one, nil, nil, nil, -u * x, -u * y], axis=1) / depth[:, None]
     dv = np.stack([nil, nil, nil, x, y, one, -v * x, -v * y], axis=1) / depth[:, None]
     along = a[:, None] * du + b[:, None] * dv
-    J = np.empty((len(x), 2, 13))
+    J = np.empty((len(x), 2, 14))
     J[:, 0, :8] = gain[:, None] * du + (slope * a)[:, None] * along
     J[:, 1, :8] = gain[:, None] * dv + (slope * b)[:, None] * along
-    for k in range(3):
-        J[:, 0, 8 + k], J[:, 1, 8 + k] = a * rho ** (k + 1), b * rho ** (k + 1)
+    for k, part in enumerate((rho, rho**2, -gain * rho, -gain * rho**2)):
+        J[:, 0, 8 + k], J[:, 1, 8 + k] = a * part / below, b * part / below
     for k, (e, f) in enumerate(((1.0, 0.0), (0.0, 1.0))):
         toward = slope * (a * e + b * f)
-        J[:, 0, 11 + k] = e * (1.0 - gain) - a * toward
-        J[:, 1, 11 + k] = f * (1.0 - gain) - b * toward
-    model = np.stack([q[11] + gain * a, q[12] + gain * b], axis=1)
+        J[:, 0, 12 + k] = e * (1.0 - gain) - a * toward
+        J[:, 1, 12 + k] = f * (1.0 - gain) - b * toward
+    model = np.stack([q[12] + gain * a, q[13] + gain * b], axis=1)
     return target - model, J[:, :, :free]
 
 
