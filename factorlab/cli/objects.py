@@ -153,12 +153,13 @@ def _network(options: dict[str, Any]) -> NetworkSettings:
     if options["size"]:
         wide, high = _numbers(options["size"].lower().replace("x", ","), 2, "--size")
         size = (int(wide), int(high))
+        if min(size) < 1:
+            raise click.BadParameter(f"{options['size']}; expected one pixel at least", param_hint="--size")
     means = _numbers(options["mean"] or "0,0,0", 3, "--mean")
     deviations = _numbers(options["deviation"] or "1,1,1", 3, "--deviation")
     names: tuple[str, ...] = ()
     if options["names"] is not None:
-        lines = options["names"].read_text(encoding="utf-8").splitlines()
-        names = tuple(line.strip() for line in lines if line.strip())
+        names = _lines(options["names"])
     return NetworkSettings(
         layout=options["layout"],
         names=names,
@@ -184,3 +185,14 @@ def _numbers(text: str, count: int, option: str) -> list[float]:
     if len(found) != count:
         raise click.BadParameter(f"{text!r}; expected {count} numbers with commas between", param_hint=option)
     return found
+
+
+def _lines(path: Path) -> tuple[str, ...]:
+    """What stands on the lines of a text file, empty ones left out."""
+    from sequential.errors import FileFormatError
+
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{path} is no text in UTF-8 (byte {error.start}); save it as such") from error
+    return tuple(line.strip() for line in lines if line.strip())

@@ -202,10 +202,10 @@ def _hue_range(
 ) -> tuple[float, float]:
     """Percentiles around the mean direction, pure colours weighing more."""
     turned = np.exp(2j * np.pi * hue / HUES) * saturation
-    if saturation.mean() < 25 or abs(turned.sum()) < 0.5 * saturation.sum():
+    if np.median(saturation) < 25 or abs(turned.sum()) < 0.5 * saturation.sum():
         raise DataError(
-            f"the sample has no one hue (mean saturation {saturation.mean():.0f} of 255); sample a plain"
-            " piece of the object, or use lab"
+            f"the sample has no one hue (median saturation {np.median(saturation):.0f} of 255); sample a"
+            " plain piece of the object, or use lab"
         )
     centre = np.angle(turned.sum()) / (2 * np.pi) * HUES
     apart = (hue - centre + HUES / 2) % HUES - HUES / 2

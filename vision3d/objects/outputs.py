@@ -124,12 +124,11 @@ def class_scores(outputs: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
         where the first output is no map.
     """
     found = np.asarray(outputs[0], np.float32)
-    if found.ndim == 4 and found.shape[0] == 1:
-        found = found[0]
-    if found.ndim != 3:
+    if found.ndim != 4 or found.shape[0] != 1:
         raise ShapeError(
-            f"the network's output has shape {found.shape}; expected (1, classes, height, width)"
+            f"mask: the output has shape {found.shape}; expected (1, classes, height, width): another layout?"
         )
+    found = found[0]
     if not np.isfinite(found).all():
         raise DataError("the network's map holds NaN or infinity; its input or its weights are at fault")
     if len(found) == 1:
@@ -156,7 +155,7 @@ def _two_dimensional(outputs: Sequence[NDArray[np.float32]], layout: Layout) -> 
     found = np.asarray(outputs[0], np.float64)
     if found.ndim < 2 or any(n != 1 for n in found.shape[:-2]):
         raise ShapeError(
-            f"{layout}: the output has shape {found.shape}; expected one image at a time, (1, …)"
+            f"{layout}: the output has shape {found.shape}; expected (1, rows, columns): another layout?"
         )
     return found.reshape(found.shape[-2:])
 

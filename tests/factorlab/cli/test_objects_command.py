@@ -130,6 +130,8 @@ def test_a_picture_without_colour(tmp_path):
         (("--color", "red", "--space", "lab"), 2, "--sample"),
         (("--sample", "1,2,x,4"), 2, "4 numbers"),
         (("--sample", "900,900,5,5"), 1, "no pixel"),
+        (("--onnx", "nowhere.onnx", "--size", "0x5"), 2, "one pixel"),
+        (("--onnx", "nowhere.onnx", "--size", "wide"), 2, "2 numbers"),
         (("--onnx", "nowhere.onnx"), 1, "nowhere.onnx"),
         (("--onnx", "nowhere.onnx", "--open", "5"), 2, "goes with --color"),
     ],
@@ -153,6 +155,9 @@ def test_bad_files_are_one_sentence(picture, tmp_path):
         ((path, "--onnx", constant(tmp_path / "odd.onnx", out=np.zeros((1, 3)))), "no family"),
         ((path, "--onnx", colour_detector(tmp_path / "n.onnx"), "--size", "96x96"), "give its size"),
         ((path, "--onnx", colour_detector(tmp_path / "m.onnx"), "--layout", "ssd"), "another layout"),
+        ((path, "--onnx", colour_detector(tmp_path / "k.onnx"), "--layout", "mask"), "another layout"),
+        ((path, "--onnx", colour_segmenter(tmp_path / "s.onnx"), "--layout", "yolo"), "another layout"),
+        ((path, "--onnx", colour_detector(tmp_path / "l.onnx"), "--names", path), "UTF-8"),
     ):
         done = run(*arguments)
         assert done.exit_code == 1, done.stderr

@@ -151,7 +151,7 @@ def test_an_unknown_layout_is_said(shapes):
     ("layout", "shape", "words"),
     [
         ("yolo", (1, 4, 20), "another layout"),
-        ("final", (2, 5, 6), "one image"),
+        ("final", (2, 5, 6), "another layout"),
         ("ssd", (1, 6, 64), "another layout"),
         ("ssd-pair", (1, 5, 4), "shapes"),
         ("mask", (1, 2, 3, 3), "no boxes"),
