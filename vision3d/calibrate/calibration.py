@@ -80,8 +80,11 @@ class Calibration:
         Corner minus projection of every view, (N_v, 2) px.
     weights : tuple[Array, ...]
         Weight of every corner of every view, (N_v,), relative to one at its stated sigma; 0: left out.
+    floor_px : float
+        What is added in squares to the views' `sigma_px`, where they understate the least or overstate the
+        most certain corners; 0 where nothing shows that.
     sigma_scale : float
-        Standard deviation of the residuals in units of the views' `sigma_px`, judged by the freedom left.
+        Standard deviation of the residuals in units of that sigma, judged by the freedom left.
     sigma_px : float
         Standard deviation of a typical corner, per axis.
     rms_px : float
@@ -111,6 +114,7 @@ class Calibration:
     views: tuple[View, ...]
     residuals: tuple[Array, ...]
     weights: tuple[Array, ...]
+    floor_px: float
     sigma_scale: float
     sigma_px: float
     rms_px: float

@@ -182,6 +182,7 @@ def _words(rms: float, largest: float, sigmas: float, turn: Array) -> str:
         told += f" once turned by {angle:.3f}°"
     if not np.isfinite(sigmas):
         return told
-    if sigmas < 2.0:
-        return f"{told}: {sigmas:.1f}x what their uncertainties lead to expect, so they agree"
-    return f"{told}: {sigmas:.1f}x what their uncertainties lead to expect, so one of them is wrong"
+    verdict = "so they agree" if sigmas < 2.0 else "more than chance easily explains"
+    if sigmas >= 3.0:
+        verdict = "so one of them is wrong"
+    return f"{told}: {sigmas:.1f}x what their uncertainties lead to expect, {verdict}"

@@ -13,6 +13,7 @@ from sequential.manifold.quaternion import quaternion_from_matrix
 from vision3d.calibrate.adjustment import Solution, Unknowns, adjust
 from vision3d.calibrate.calibration import Calibration
 from vision3d.calibrate.flatness import with_flatness
+from vision3d.calibrate.noise import floor_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.result import result_of
 from vision3d.calibrate.robust import fit_robustly, weights_of, weights_of_views
@@ -72,8 +73,9 @@ def calibrate(
 
     Notes
     -----
-    Maximum likelihood under independent corner errors with the standard deviations of `View.sigma_px`, their
-    common scale estimated.  The covariance is the inverse of the information (Triggs et al. 2000).
+    Maximum likelihood under independent corner errors with the standard deviations of `View.sigma_px`, a
+    floor below them and their common scale estimated.  The covariance is the inverse of the information
+    (Triggs et al. 2000), widened where the views scatter more: see `vision3d.calibrate.covariance`.
     """
     views = tuple(views)
     _check(views, lens)
@@ -81,7 +83,11 @@ def calibrate(
     begun = _grow(problem, views, lens, start, robust=robust)
     free = np.ones(len(begun.unknowns.parameters) + 2, dtype=bool)
     free[-2:] = board_warp
-    found = result_of(views, problem, fit_robustly(problem, begun, free, robust=robust), free)
+    trusted = fit_robustly(problem, begun, free, robust=robust)
+    if floor_px := floor_of(trusted.solution.blocks.residuals, problem.sigma_px):
+        problem = Problem.of(views, floor_px)
+        trusted = fit_robustly(problem, trusted.solution, free, robust=robust)
+    found = result_of(views, problem, trusted, free)
     return found if board_warp else with_flatness(found)
 
 

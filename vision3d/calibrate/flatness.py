@@ -28,7 +28,7 @@ def with_flatness(found: Calibration) -> Calibration:
     """Add a finding where the corners of views err together and a bent board explains a part of it."""
     if found.inflation <= 1.0 or any(np.ptp(view.points[:, 2]) > 0.0 for view in found.views):
         return found
-    problem = Problem.of(found.views)
+    problem = Problem.of(found.views, found.floor_px)
     weights = weights_of(problem, np.concatenate(found.weights))
     begun = Unknowns(found.camera.lens, found.camera.parameters, found.warp, found.poses)
     solution = adjust(problem, begun, weights, np.ones(found.camera.count + 2, dtype=bool))

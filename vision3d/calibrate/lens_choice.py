@@ -122,14 +122,14 @@ def choose_lens(
     if not fits:
         raise next(iter(refused.values()))
     best_fit = min(fits.values(), key=_typical)
-    problem, weights = Problem.of(views), np.concatenate(best_fit.weights)
+    problem, weights = Problem.of(views, best_fit.floor_px), np.concatenate(best_fit.weights)
     rows = []
     for lens in lenses:
         began = time.perf_counter()
         if lens in refused:
             rows.append(_refusal(lens, len(views), took[lens], str(refused[lens])))
             continue
-        found = _with_weights(fits[lens], problem, weights, best_fit.outlier_views)
+        found = _as_judged_by(best_fit, fits[lens], problem, weights)
         rows.append(_score(found, problem, weights, took[lens] - began))
     return _chosen(rows)
 
@@ -173,19 +173,16 @@ def _typical(found: Calibration) -> float:
     return float(np.median(np.linalg.norm(np.concatenate(found.residuals), axis=1)))
 
 
-def _with_weights(
-    found: Calibration, problem: Problem, weights: Array, outlier_views: tuple[int, ...]
-) -> Calibration:
-    """The same lens fitted to the corners that count for all."""
-    if np.array_equal(np.concatenate(found.weights), weights):
+def _as_judged_by(best: Calibration, found: Calibration, problem: Problem, weights: Array) -> Calibration:
+    """The same lens fitted to the corners that count for all, and as much as for all."""
+    if found.floor_px == best.floor_px and np.array_equal(np.concatenate(found.weights), weights):
         return found
     free = np.ones(found.camera.count + 2, dtype=bool)
     free[-2:] = found.warp_std > 0.0
     begun = Unknowns(found.camera.lens, found.camera.parameters, found.warp, found.poses)
     solution = adjust(problem, begun, weights_of(problem, weights), free)
-    return result_of(
-        found.views, problem, Trusted(solution, weights, outlier_views, solution.iterations), free
-    )
+    trusted = Trusted(solution, weights, best.outlier_views, solution.iterations)
+    return result_of(found.views, problem, trusted, free)
 
 
 def _score(found: Calibration, problem: Problem, weights: Array, offset: float) -> LensScore:
@@ -228,6 +225,10 @@ def _remarked(row: LensScore, chosen: LensScore, usable: list[LensScore]) -> Len
         return row
     if row not in usable:
         return replace(row, remark="its distortion folds within the image")
-    worse = 100.0 * (row.held_out_rms_px / chosen.held_out_rms_px - 1.0)
-    remark = f"{worse:.1f} % worse on views left out" if worse > 0.0 else "no better, with more coefficients"
+    times = row.held_out_rms_px / chosen.held_out_rms_px
+    remark = f"{100.0 * (times - 1.0):.1f} % worse on views left out"
+    if times > 2.0:
+        remark = f"{times:.3g}x worse on views left out"
+    elif times <= 1.0:
+        remark = "no better, with more coefficients"
     return replace(row, remark=remark)

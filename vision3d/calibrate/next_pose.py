@@ -111,7 +111,8 @@ def _information(calibration: Calibration, board: Board, poses: Array, seen: NDA
     """What a view at each pose tells about θ, its own pose eliminated, (C, q, q)."""
     n = board.count
     points = np.tile(board.points, (len(poses), 1))
-    sigma = float(np.median(np.concatenate([view.sigma_px for view in calibration.views])))
+    stated = float(np.median(np.concatenate([view.sigma_px for view in calibration.views])))
+    sigma = float(np.hypot(stated, calibration.floor_px))
     problem = Problem.of_points(points, sigma, np.arange(len(poses) + 1) * n, calibration.camera.size)
     unknowns = Unknowns(calibration.camera.lens, calibration.camera.parameters, calibration.warp, poses)
     blocks = linearize(problem, unknowns, seen.ravel() / sigma**2)

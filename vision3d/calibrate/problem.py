@@ -24,7 +24,7 @@ class Problem:
     points, pixels : Array
         (M, 3) on the board, m; (M, 2) in the image, px.
     sigma_px : Array
-        (M,), what the detection says of every corner, per axis.
+        (M,), standard deviation of every corner, per axis, before scaling.
     bend : Array
         (M, 2): how far along z the two numbers of a bent board push each point: 1 in the middle of the
         board and 0 at its ends, along x and along y.
@@ -32,6 +32,8 @@ class Problem:
         (V + 1,): view v has the corners starts[v] to starts[v + 1].
     size : tuple[int, int]
         Width and height of the images.
+    floor_px : float
+        What `sigma_px` has in it besides what the views state.
     """
 
     points: Array
@@ -40,19 +42,21 @@ class Problem:
     bend: Array
     starts: NDArray[np.int64]
     size: tuple[int, int]
+    floor_px: float = 0.0
 
     @classmethod
-    def of(cls, views: Sequence[View]) -> Problem:
-        """Lay out the corners of the views."""
+    def of(cls, views: Sequence[View], floor_px: float = 0.0) -> Problem:
+        """Lay out the corners of the views, a floor below their sigmas: see `vision3d.calibrate.noise`."""
         points = np.concatenate([np.asarray(view.points, np.float64) for view in views])
         counts = [len(view.points) for view in views]
         return cls(
             points,
             np.concatenate([np.asarray(view.pixels, np.float64) for view in views]),
-            np.concatenate([np.asarray(view.sigma_px, np.float64) for view in views]),
+            np.hypot(np.concatenate([np.asarray(view.sigma_px, np.float64) for view in views]), floor_px),
             _bend(points),
             np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
             views[0].size,
+            floor_px,
         )
 
     @classmethod
@@ -80,7 +84,13 @@ class Problem:
         counts = np.diff(self.starts)[np.asarray(chosen, np.int64)]
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         return Problem(
-            self.points[rows], self.pixels[rows], self.sigma_px[rows], self.bend[rows], starts, self.size
+            self.points[rows],
+            self.pixels[rows],
+            self.sigma_px[rows],
+            self.bend[rows],
+            starts,
+            self.size,
+            self.floor_px,
         )
 
     def split(self, values: Array) -> tuple[Array, ...]:

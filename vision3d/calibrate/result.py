@@ -55,7 +55,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     numbers = np.concatenate([view.ids for view in views])
     left_out = tuple((int(owner[i]), int(numbers[i])) for i in np.flatnonzero(~used))
     rms = float(np.sqrt(np.mean(squares[relative == 1.0])))
-    findings = _findings(views, camera, trusted, left_out, view_rms, known, groups)
+    findings = _findings(views, problem, camera, trusted, left_out, view_rms, known, groups)
     message = (
         f"{camera.lens}: {len(views)} views, {int(used.sum())} of {len(used)} corners, RMS {rms:.3f} px, "
         f"{'settled' if solution.converged else 'not settled'} after {trusted.iterations} steps"
@@ -82,6 +82,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
         views=views,
         residuals=problem.split(residuals),
         weights=problem.split(relative),
+        floor_px=problem.floor_px,
         sigma_scale=scale,
         sigma_px=scale * float(np.sqrt(np.mean(problem.sigma_px[used] ** 2))),
         rms_px=rms,
@@ -109,6 +110,7 @@ def _missing(problem: Problem, poses: Array, focal: float) -> str:
 
 def _findings(
     views: tuple[View, ...],
+    problem: Problem,
     camera: Camera,
     trusted: Trusted,
     left_out: tuple[tuple[int, int], ...],
@@ -121,10 +123,10 @@ def _findings(
     if not trusted.solution.converged:
         found.append("the solve had not settled when it ended: the result may be away from the best fit")
     for v in trusted.outlier_views:
-        ratio = view_rms[v] / float(np.median(view_rms))
+        weight = trusted.weights[problem.starts[v] : problem.starts[v + 1]].max()
         found.append(
-            f"{views[v].name} fits {ratio:.1f}x worse than the others (RMS {view_rms[v]:.2f} px) and counts "
-            "accordingly less; look at its corners, or leave it out"
+            f"{views[v].name} fits {weight**-0.5:.1f}x worse than the others for what its corners state (RMS "
+            f"{view_rms[v]:.2f} px) and counts accordingly less; look at its corners, or leave it out"
         )
     for v in sorted({one for one, _ in left_out}):
         corners = ", ".join(str(corner) for one, corner in left_out if one == v)
