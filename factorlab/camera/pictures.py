@@ -18,6 +18,7 @@ VIDEO_SUFFIXES = frozenset(
     (".avi", ".m4v", ".mjpeg", ".mjpg", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".ts", ".webm", ".wmv")
 )
 LONGEST = 100_000  # frames, of a video that does not tell how many it has
+LOOKED_AT = 1500  # frames of a video that are judged
 
 
 def open_pictures(given: Sequence[str], frames: int = 40) -> ImageSet:
@@ -32,10 +33,11 @@ def open_pictures(given: Sequence[str], frames: int = 40) -> ImageSet:
     DataError
         where nothing is found, nothing of it can be read, or a video has another size than the pictures.
     """
-    videos = [one for one in given if Path(one).suffix.lower() in VIDEO_SUFFIXES]
-    rest = [one for one in given if one not in videos]
+    videos = dict.fromkeys(Path(one) for one in given if Path(one).suffix.lower() in VIDEO_SUFFIXES)
+    rest = [one for one in given if Path(one) not in videos]
     sets = [read_images(rest)] if rest else []
-    sets += [sharpest_frames(Path(one), frames) for one in dict.fromkeys(videos)]
+    alike = len({path.name for path in videos}) < len(videos)
+    sets += [sharpest_frames(path, frames, str(path) if alike else path.name) for path in videos]
     if len({one.size for one in sets}) > 1:
         listed = " and ".join(f"{one.size[0]}x{one.size[1]}" for one in sets)
         raise DataError(f"a camera is calibrated at one size, but these are {listed}; give those of one")
@@ -59,22 +61,25 @@ def held_pictures(images: Sequence[tuple[str, Picture]]) -> ImageSet:
     return ImageSet(tuple(images), (int(width), int(height)))
 
 
-def sharpest_frames(path: Path, count: int) -> ImageSet:
-    """The sharpest frame of each of `count` equal stretches of a video."""
+def sharpest_frames(path: Path, count: int, name: str) -> ImageSet:
+    """The sharpest frame of each of `count` equal stretches of a video, which is called `name`."""
     from vision3d.frames import open_frames
 
     best: dict[int, tuple[float, str, Picture]] = {}
     with open_frames(path) as source:
         stretch = max(1.0, (source.count or LONGEST) / count)
+        step = max(1, (source.count or 0) // LOOKED_AT)
         for frame in source:
+            if frame.index % step:
+                continue
             place = int(frame.index / stretch)
             sharpness = _sharpness(frame.grey)
             if place not in best or sharpness > best[place][0]:
-                best[place] = (sharpness, f"{path.name} frame {frame.index}", frame.grey)
-        left_out = (LeftOut(path.name, source.fault),) if source.fault else ()
+                best[place] = (sharpness, f"{name} frame {frame.index}", frame.grey)
+        left_out = (LeftOut(name, source.fault),) if source.fault else ()
         size = source.size
-    images = [(name, image) for _, name, image in best.values()]
-    step = -(-len(images) // count)  # a video that did not tell its length
+    images = [(called, image) for _, called, image in best.values()]
+    step = max(1, -(-len(images) // count))  # a video that did not tell its length
     return ImageSet(tuple(images[::step]), size, left_out)
 
 

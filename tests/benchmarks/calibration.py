@@ -66,7 +66,7 @@ def main() -> int:
     say("OpenCV's sample images")
     figures = sample_figures()
     say("rendered sets")
-    figures |= rendered_figures(max(4, round(100 * share)))
+    figures |= rendered_figures(max(4, round(200 * share)))
     say("Monte Carlo of the projection uncertainty")
     figures |= spread_figures(sample_images(), max(60, round(1000 * share)))
     say("choice of the lens")

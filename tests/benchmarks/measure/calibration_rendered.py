@@ -69,7 +69,7 @@ def rms(values: np.ndarray) -> float:
 
 
 def rendered_figures(count: int) -> dict[str, Figure]:
-    """Row 2: over all sets; chance spreads the RMS of 40 honest sets by 11 %, that of 100 by 7 %."""
+    """Row 2: over all sets; chance spreads the RMS of 40 honest sets by 11 %, that of 200 by 5 %."""
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         trials = list(pool.map(trial, range(count)))
     z = np.array([one.z for one in trials])
