@@ -3,7 +3,8 @@
 A detector knows the noise of the pixels; a board, a lens and light add what it cannot know.  The more certain
 a corner claims to be, the more of its error is of that kind.  So the variance of a corner is taken for
 scale² (sigma² + floor²), and the floor is what makes the residuals most likely: under Student's t, which
-wrong corners do not sway (Lange, Little, Taylor 1989, "Robust statistical modeling using the t distribution").
+wrong corners do not sway (Lange, Little, Taylor 1989, "Robust statistical modeling using the t
+distribution").
 """
 
 from __future__ import annotations
