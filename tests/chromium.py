@@ -128,7 +128,7 @@ class Chromium:
             raise RuntimeError(answer["exceptionDetails"])
         return answer["result"].get("value")
 
-    def until(self, script, seconds=15):
+    def until(self, script, seconds=45):
         """Wait until a script gives something that is true, and give it."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:

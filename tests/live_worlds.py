@@ -35,7 +35,7 @@ def marker_image(t, rng):
     return render_planes(CAMERA, planes, rng=rng, supersample=2, noise=1.0)
 
 
-def wait_for(condition, seconds=20):
+def wait_for(condition, seconds=60):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if value := condition():

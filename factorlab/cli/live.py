@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,20 +96,20 @@ def camera(source: str, **options: Any) -> int:
     session = CameraSession(
         frames, task_choices(settings), options["task"], recordings=settings.folder, fast=options["fast"]
     )
-    with stopping() as stop:
+    with stopping() as stop, ExitStack() as ending:
+        ending.callback(frames.close)
+        ending.callback(session.close)
         server = PageServer(session, options["port"])
-        try:
-            if options["record"] is not None:
-                session.start_recording()
-            session.start()
-            click.echo(f"live: {server.address}  (Ctrl-C ends)", err=True)
-            if not options["no_browser"]:
-                click.launch(server.address)
-            while not (stop.wait(0.1) or (options["leave"] and session.ended)):
-                pass
-        finally:
-            session.close()
-            server.close()
+        ending.callback(server.close)
+        ending.callback(session.close)  # first, so that pages hear that it is over; a second time is nothing
+        if options["record"] is not None:
+            session.start_recording()
+        session.start()
+        click.echo(f"live: {server.address}  (Ctrl-C ends)", err=True)
+        if not options["no_browser"]:
+            click.launch(server.address)
+        while not (stop.wait(0.1) or (options["leave"] and session.ended)):
+            pass
     summary = summary_of(session)
     if options["as_json"]:
         print_json(summary)
@@ -124,8 +125,8 @@ def _settings(options: dict[str, Any], size: tuple[int, int]) -> TaskSettings:
 
     dictionary, model = options["dictionary"], options["model"]
     hung = [name for name in ("height", "pitch") if options[name] is not None]
-    if hung and (len(hung) < 2 or model is None):
-        raise click.UsageError("a line in metres takes --camera, --height and --pitch together")
+    if len(hung) == 1:
+        raise click.UsageError("a line in metres takes --height and --pitch together")
     try:
         marker_m = metres(options["size"], "size of a marker")
         height_m = metres(options["height"], "height") if hung else None

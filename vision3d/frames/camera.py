@@ -33,6 +33,8 @@ class CameraFrames(FrameSource):
         self._closed = False
         sides = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
         wish: list[tuple[int, float]] = [] if size is None else list(zip(sides, size, strict=True))
+        if size is not None:  # what is not compressed comes slowly where it is large
+            wish.insert(0, (cv2.CAP_PROP_FOURCC, float(cv2.VideoWriter.fourcc(*"MJPG"))))
         if fps is not None:
             wish.append((cv2.CAP_PROP_FPS, fps))
         with quiet():

@@ -71,7 +71,8 @@ class FrameReader:
         if not self.ended.is_set() or self._stop.is_set():
             return
         old = self.source
-        self.source = open_frames(old.name, loop=old.loop, fps=None if old.live else old.fps)
+        wish = {"size": old.size} if old.live else {"fps": old.fps}
+        self.source = open_frames(old.name, loop=old.loop, **wish)
         self.laps += 1
         self.ended.clear()
         self._going.set()

@@ -154,7 +154,7 @@ def test_poses_of_markers_are_recorded(video, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--height", "20cm"), "takes --camera, --height and --pitch together"),
+        (("--height", "20cm"), "takes --height and --pitch together"),
         (("--board", "9"), "columns x rows"),
         (("--size", "50"), "did you mean 50mm?"),
         (("--resolution", "640"), "a resolution is written as 640x480, got '640'"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from live_worlds import wait_for
 
-from factorlab.live.camera import TaskSettings
+from factorlab.live.camera import TaskSettings, task_choices
 from factorlab.live.camera.tasks.board_watch import BoardWatch, motion, quick_corners
 from factorlab.live.camera.tasks.calibrate import CalibrateTask
 from sequential.errors import DataError
@@ -208,3 +208,19 @@ def test_other_boards_are_taken_as_well(board, tmp_path, rng):
         assert standing.calibration.camera.intrinsics[:2] == pytest.approx(CAMERA.intrinsics[:2], rel=0.03)
     finally:
         task.close()
+
+
+def test_the_other_tasks_know_the_camera_that_was_saved(held, tmp_path):
+    settings = TaskSettings(board=BOARD, lens="brown2", folder=tmp_path, height_m=0.2, pitch_deg=40.0)
+    tasks = {one.name: one.make() for one in task_choices(settings)}
+    try:
+        assert tasks["markers"].actions == ()
+        hold(tasks["calibrate"], held[1])
+        tasks["calibrate"].act("finish")
+        wait_for(lambda: tasks["calibrate"].desk.now.saved)
+        for name in ("markers", "line"):
+            tasks[name].restart()  # as a session does where it is chosen
+        assert dict(tasks["markers"].actions).keys() == {"forget"}
+        assert tasks["line"]._ground.camera.lens == "brown2"
+    finally:
+        tasks["calibrate"].close()

@@ -83,7 +83,7 @@ def test_metres_on_the_ground_are_the_true_ones(rng):
     mount = CameraMount(height_m=0.2, pitch_rad=0.7)
     stripe = GroundLine(np.array([[-1.0, 0.06], [3.0, 0.06]]), width_m=0.04)
     image = render_ground(camera, mount, stripe, np.zeros(3), rng=rng)
-    task = LineTask(ground=GroundHomography.from_camera(camera, mount))
+    task = LineTask(ground=lambda: GroundHomography.from_camera(camera, mount))
     reading = task.read(Frame(0, 0, cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), ""))
     row = reading.rows[0]
     assert row["left_m"] == pytest.approx(0.06, abs=max(5 * row["left_sigma_m"], 1e-3))

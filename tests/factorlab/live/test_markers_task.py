@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from live_worlds import CAMERA, MARKER_M, MARKERS, marker_image, marker_pose
 
+from factorlab.live.camera.tasks.known import KnownCamera
 from factorlab.live.camera.tasks.markers import PATIENCE, MarkersTask
 from sequential.errors import DataError
 from sequential.manifold import SE3
@@ -23,13 +24,13 @@ def images():
 
 @pytest.fixture
 def task():
-    made = MarkersTask(CAMERA, MARKER_M, "4x4_50")
+    made = MarkersTask(KnownCamera(CAMERA), MARKER_M, "4x4_50")
     made.prepare()
     return made
 
 
 def test_without_a_model_there_are_numbers_and_places_in_the_image(images):
-    task = MarkersTask(dictionary="4x4_50")
+    task = MarkersTask(KnownCamera(), dictionary="4x4_50")
     reading = task.read(frame(0, images[0]))
     assert [row["id"] for row in reading.rows] == sorted(MARKERS)
     for row in reading.rows:
@@ -92,7 +93,7 @@ def test_tracks_begin_anew_by_a_button(task, images):
 
 
 def test_the_dictionary_is_found_out_frame_by_frame(images):
-    task = MarkersTask()
+    task = MarkersTask(KnownCamera())
     readings = [task.read(frame(k, images[0])) for k in range(12)]
     assert readings[-1].headline == "2 markers"
     assert task.summary()["dictionary"] == "4x4_50"
@@ -109,7 +110,7 @@ def test_an_open_pose_says_what_to_do(rng):
     turn = SE3().retract(SE3().identity(), np.array([0.12, 0.0, 0, 0, 0, 0]))
     plane = Plane(np.array([*turn[:4], 0.02, 0.01, 1.1]), marker_texture("4x4_50", 3, MARKER_M))
     image = render_planes(CAMERA, [plane], rng=rng, noise=3.0)
-    reading = MarkersTask(CAMERA, MARKER_M, "4x4_50").read(frame(0, image))
+    reading = MarkersTask(KnownCamera(CAMERA), MARKER_M, "4x4_50").read(frame(0, image))
     assert (reading.headline, reading.state) == ("1 marker, 1 with two poses", "warn")
     assert reading.notes[0].startswith("3: two poses fit, odds ")
     assert reading.rows[0]["odds"] < 20

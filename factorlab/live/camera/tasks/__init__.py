@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from factorlab.live.camera.session import TaskChoice
 from factorlab.live.camera.task import Task
+from factorlab.live.camera.tasks.known import KnownCamera
 
 if TYPE_CHECKING:
     from vision3d.boards import Board
@@ -48,24 +49,25 @@ class TaskSettings:
 
 
 def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
-    """Every task, with its settings."""
+    """Every task, with its settings; what a calibration finds, the others know."""
+    known = KnownCamera(settings.camera)
 
     def markers() -> Task:
         from factorlab.live.camera.tasks.markers import MarkersTask
 
-        return MarkersTask(settings.camera, settings.marker_m, settings.dictionary)
+        return MarkersTask(known, settings.marker_m, settings.dictionary)
 
     def calibrate() -> Task:
         from factorlab.live.camera.tasks.calibrate import CalibrateTask
         from vision3d.boards import Checkerboard
 
         board = settings.board or Checkerboard(9, 6, 0.025)
-        return CalibrateTask(board, settings.lens, settings.folder, settings.command)
+        return CalibrateTask(board, settings.lens, settings.folder, settings.command, known)
 
     def line() -> Task:
         from factorlab.live.camera.tasks.line import LineTask
 
-        return LineTask(settings.line, _ground(settings))
+        return LineTask(settings.line, lambda: _ground(settings, known))
 
     def features() -> Task:
         from factorlab.live.camera.tasks.features import FeaturesTask
@@ -76,13 +78,13 @@ def task_choices(settings: TaskSettings) -> tuple[TaskChoice, ...]:
     return tuple(TaskChoice(name, title, makers[name]) for name, title in TASKS.items())
 
 
-def _ground(settings: TaskSettings) -> GroundHomography | None:
+def _ground(settings: TaskSettings, known: KnownCamera) -> GroundHomography | None:
     """The ground, where the camera's model is known and where it hangs."""
-    if settings.camera is None or settings.height_m is None or settings.pitch_deg is None:
+    if known.camera is None or settings.height_m is None or settings.pitch_deg is None:
         return None
     from math import radians
 
     from vision3d.lines import CameraMount, GroundHomography
 
     mount = CameraMount(settings.height_m, radians(settings.pitch_deg))
-    return GroundHomography.from_camera(settings.camera, mount)
+    return GroundHomography.from_camera(known.camera, mount)

@@ -12,6 +12,7 @@ from factorlab.live.camera.reading import Column, Dots, Line, Mark, Number, Read
 from factorlab.live.camera.task import Action, Task
 from factorlab.live.camera.tasks.board_watch import BoardWatch, SeenBoard
 from factorlab.live.camera.tasks.desk import FEWEST, CalibrationDesk, Standing
+from factorlab.live.camera.tasks.known import KnownCamera
 from sequential.errors import DataError
 from vision3d.boards import Board
 from vision3d.frames import Frame
@@ -37,13 +38,16 @@ class CalibrateTask(Task):
     lens : a name of `vision3d.camera.LENSES`, or `auto`
     folder : calibrations are saved in folders of their own in it
     command : stands in the report
+    known : is told the camera that was saved
     """
 
     name: ClassVar = "calibrate"
     columns: ClassVar = ("corners", "speed_px_s", "views", "rms_px", "fx_px", "fx_sigma_px")
 
-    def __init__(self, board: Board, lens: str, folder: Path, command: str = "") -> None:
-        self.desk = CalibrationDesk(board, lens, folder, command)
+    def __init__(
+        self, board: Board, lens: str, folder: Path, command: str = "", known: KnownCamera | None = None
+    ) -> None:
+        self.desk = CalibrationDesk(board, lens, folder, command, known)
         self._watch = BoardWatch(board)
         self._kept: list[SeenBoard] = []
         self._frame: Frame | None = None

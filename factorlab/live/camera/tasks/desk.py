@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from factorlab.live.camera.tasks.known import KnownCamera
 from sequential.errors import FactorlabError
 from vision3d.boards import Board
 from vision3d.views import Missed, View
@@ -80,10 +81,14 @@ class CalibrationDesk:
     lens : a name of `vision3d.camera.LENSES`; `auto` is the lens that predicts best, at the end
     folder : reports are made in a folder of their own in it
     command : stands in the report
+    known : is told the camera that was saved
     """
 
-    def __init__(self, board: Board, lens: str, folder: Path, command: str = "") -> None:
+    def __init__(
+        self, board: Board, lens: str, folder: Path, command: str = "", known: KnownCamera | None = None
+    ) -> None:
         self.board, self._lens, self._root, self._command = board, lens, folder, command
+        self._known = known or KnownCamera()
         self.now, self.version = Standing(), 0
         self._pictures: list[tuple[str, Picture]] = []
         self._folder: Path | None = None
@@ -205,6 +210,7 @@ class CalibrationDesk:
         page = write_document(document, self._folder / "report", force=True, files=files)
         offered = {name: text if isinstance(text, bytes) else text.encode() for name, text in files.items()}
         fit = done.calibration
+        self._known.camera = fit.camera
         words = (
             f"saved to {self._folder}: {fit.camera.lens}, RMS {fit.rms_px:.3f} px, "
             f"fx {fit.camera.intrinsics[0]:.2f} ± {fit.std[0]:.2f} px"

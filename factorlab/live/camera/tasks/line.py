@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -20,13 +21,18 @@ POLARITIES = {"auto": "Dark or light", "dark": "Dark line", "light": "Light line
 SURE = 0.8
 
 
+def nowhere() -> GroundHomography | None:
+    """No ground is known."""
+    return None
+
+
 class LineTask(Task):
     """Finds the line on the ground in every frame.
 
     Parameters
     ----------
     settings : where to look, and for what
-    ground : the map to the ground; None: pixels only
+    ground : gives the map to the ground as it is known by now, or None: pixels only
     """
 
     name: ClassVar = "line"
@@ -36,8 +42,10 @@ class LineTask(Task):
         "left_m", "left_sigma_m", "ground_heading_deg", "ground_heading_sigma_deg",
     )  # fmt: skip
 
-    def __init__(self, settings: LineSettings | None = None, ground: GroundHomography | None = None) -> None:
-        self._settings, self._ground = settings or LineSettings(), ground
+    def __init__(
+        self, settings: LineSettings | None = None, ground: Callable[[], GroundHomography | None] = nowhere
+    ) -> None:
+        self._settings, self._ask, self._ground = settings or LineSettings(), ground, ground()
         self._frames = self._found = 0
 
     @property
@@ -83,7 +91,8 @@ class LineTask(Task):
         return f"looking for: {POLARITIES[action].lower()}"
 
     def restart(self) -> None:
-        """Count frames anew."""
+        """Count frames anew; take the ground that is known now."""
+        self._ground = self._ask()
         self._frames = self._found = 0
 
     def summary(self) -> dict[str, object]:

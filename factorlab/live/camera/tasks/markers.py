@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.live.camera.reading import Column, Dots, Label, Line, Mark, Number, Reading, Role, Table
 from factorlab.live.camera.task import Action, Task
+from factorlab.live.camera.tasks.known import KnownCamera
 from sequential.errors import DataError
 from sequential.manifold.quaternion import rotation_matrix
+from vision3d.camera import Camera
 from vision3d.frames import Frame
 from vision3d.markers import Marker, MarkerTracker, TrackedMarker, find_markers, marker_corners
 from vision3d.markers.dictionaries import FAMILIES
 from vision3d.pose import project_object
-
-if TYPE_CHECKING:
-    from vision3d.camera import Camera
 
 __all__ = ["MarkersTask"]
 
@@ -27,7 +26,7 @@ PATIENCE = 50  # frames without a marker, after which a dictionary that was foun
 TRACED = 3  # markers whose distance the page draws over time
 PLACE = ("x_m", "y_m", "z_m")
 POSE = (*PLACE, "qw", "qx", "qy", "qz")
-NO_MODEL = "Give the camera's model by --camera FILE, and the markers' side by --size, to see where they are."
+NO_MODEL = "Give the camera's model by --camera FILE, or calibrate it here, to see where the markers are."
 
 
 class MarkersTask(Task):
@@ -35,7 +34,7 @@ class MarkersTask(Task):
 
     Parameters
     ----------
-    camera : its model; None: numbers and corners only
+    known : the camera's model; without one, numbers and corners only
     size_m : side of the black squares
     dictionary : its name; `auto` finds it out
     """
@@ -46,10 +45,9 @@ class MarkersTask(Task):
         "tilt_deg", "odds", *(f"other_{name}" for name in POSE),
     )  # fmt: skip
 
-    def __init__(self, camera: Camera | None = None, size_m: float = 0.05, dictionary: str = "auto") -> None:
-        self._camera, self._size_m, self._dictionary = camera, size_m, dictionary
-        self._asked = dictionary
-        self._tried = self._blind = 0
+    def __init__(self, known: KnownCamera, size_m: float = 0.05, dictionary: str = "auto") -> None:
+        self._known, self._size_m, self._asked = known, size_m, dictionary
+        self._dictionary, self._tried, self._blind = dictionary, 0, 0
         self._ids: set[int] = set()
         self._last: tuple[Frame, Reading] | None = None
         self.restart()
@@ -65,14 +63,13 @@ class MarkersTask(Task):
 
         import_module("vision3d.kernels.quad_edges")
         find_markers(np.zeros((64, 64), np.uint8), self._asked)
-        if self._camera is None or self._tracker is None:
-            return
-        depth = self._size_m * float(self._camera.intrinsics[0]) / 80.0
+        camera = self._camera or Camera("pinhole", [300.0, 300.0, 160.0, 120.0], [], (320, 240))
+        tracker = MarkerTracker(camera, self._size_m)
+        depth = self._size_m * float(camera.intrinsics[0]) / 80.0
         for t in range(3):
             pose = np.array([np.cos(0.2), np.sin(0.2), 0.0, 0.0, 0.001 * t, 0.0, depth])
-            corners = project_object(self._camera, pose, marker_corners(self._size_m))
-            self._tracker.update(0.04 * t, [Marker(0, corners, np.full(4, 0.1))])
-        self.restart()
+            corners = project_object(camera, pose, marker_corners(self._size_m))
+            tracker.update(0.04 * t, [Marker(0, corners, np.full(4, 0.1))])
 
     def read(self, frame: Frame) -> Reading:
         """Every marker of the frame."""
@@ -111,7 +108,8 @@ class MarkersTask(Task):
         return "the tracks begin anew"
 
     def restart(self) -> None:
-        """Forget the tracks, and the dictionary where it was found out."""
+        """Forget the tracks, and the dictionary where it was found out; take the model that is known now."""
+        self._camera = self._known.camera
         self._tracker = None if self._camera is None else MarkerTracker(self._camera, self._size_m)
         self._dictionary, self._tried, self._blind = self._asked, 0, 0
 
