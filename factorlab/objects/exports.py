@@ -31,23 +31,24 @@ def overlay(found: Found) -> NDArray[np.uint8]:
 
     image = np.ascontiguousarray(found.image).copy()
     names = sorted({one.name for one in found.items})
-    thick = max(1, round(min(image.shape[:2]) / 300))
+    thick = max(1, round(min(image.shape[:2]) / 600))
     if found.mask is not None:
         outlines, _ = cv2.findContours(
             (found.mask > 0).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
         )
-        cv2.drawContours(image, outlines, -1, (255, 255, 255), thick)
+        for ink, width_px in (((0, 0, 0), 2 * thick + 1), ((255, 255, 255), thick)):  # seen on any ground
+            cv2.drawContours(image, outlines, -1, ink, width_px)
     size = max(0.4, min(image.shape[:2]) / 900)
     for k, one in enumerate(found.items, 1):
         colour = MARKS[names.index(one.name) % len(MARKS)]
         left, top, width, height = one.box
         first = (round(left), round(top))
         last = (round(left + width) - 1, round(top + height) - 1)
-        cv2.rectangle(image, first, last, colour, 2 * thick)
+        cv2.rectangle(image, first, last, colour, 2 * thick if min(image.shape[:2]) > 200 else 1)
         x, y = (round(v) for v in one.centre)
-        cv2.drawMarker(image, (x, y), colour, cv2.MARKER_CROSS, 8 * thick, 2 * thick)
+        cv2.drawMarker(image, (x, y), colour, cv2.MARKER_CROSS, 8 * thick, thick)
         at = (first[0], max(first[1] - 3 * thick, round(24 * size)))
-        for ink, width_px in (((255, 255, 255), 4 * thick), (colour, 2 * thick)):
+        for ink, width_px in (((255, 255, 255), 3 * thick), (colour, thick)):
             cv2.putText(image, str(k), at, cv2.FONT_HERSHEY_SIMPLEX, size, ink, width_px, cv2.LINE_AA)
     return image
 

@@ -41,23 +41,30 @@ class OnnxFile:
 
     @property
     def image_size(self) -> tuple[int, int] | None:
-        """(width, height) of the image that the first input wants; None where that is open."""
+        """(width, height) of the image that the first input wants, or was exported for; None where unsaid."""
         shape = next(iter(self.inputs.values()), ())
-        if len(shape) != 4:
-            return None
-        height, width = shape[2], shape[3]
-        return (width, height) if isinstance(width, int) and isinstance(height, int) and width > 0 else None
+        if len(shape) == 4 and all(isinstance(n, int) and n > 0 for n in shape[2:]):
+            return int(shape[3]), int(shape[2])
+        noted = _literal(self.notes.get("imgsz", ""))  # Ultralytics: height and width
+        if isinstance(noted, list | tuple) and len(noted) == 2 and all(isinstance(n, int) for n in noted):
+            return (noted[1], noted[0]) if min(noted) > 0 else None
+        return None
 
     @property
     def class_names(self) -> tuple[str, ...]:
         """Names of classes, where the exporter wrote them: a list, or a table by number."""
-        try:
-            found = ast.literal_eval(self.notes.get("names", ""))
-        except (ValueError, SyntaxError, MemoryError, RecursionError):
-            return ()
+        found = _literal(self.notes.get("names", ""))
         if isinstance(found, dict) and found and all(isinstance(k, int) and 0 <= k < 100_000 for k in found):
             return tuple(str(found.get(k, f"class {k}")) for k in range(max(found) + 1))
         return tuple(str(one) for one in found) if isinstance(found, list | tuple) else ()
+
+
+def _literal(text: str) -> Any:
+    """A list, table or number written as Python writes it; None where it is not."""
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return None
 
 
 def read_onnx(path: Path | str) -> OnnxFile:

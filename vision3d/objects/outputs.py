@@ -136,7 +136,7 @@ def class_scores(outputs: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
         return np.asarray(np.stack([1 - share, share]), np.float32)
     total = found.sum(axis=0)
     if found.min() >= 0 and np.allclose(total, 1, atol=1e-3):
-        return found
+        return np.asarray(found, np.float32)
     odds = np.exp(found - found.max(axis=0))
     return np.asarray(odds / odds.sum(axis=0), np.float32)
 

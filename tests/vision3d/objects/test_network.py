@@ -192,6 +192,12 @@ def test_open_dimensions_and_weights_among_inputs(tmp_path):
     assert found.inputs == {"images": ("batch", 3, "height", SIZE)}
     assert found.image_size is None
     assert found.class_names == ()
+    for written, size in (("[320, 640]", (640, 320)), ("[0, 640]", None), ("rm -rf", None), ("640", None)):
+        del model.metadata_props[:]
+        note = model.metadata_props.add()
+        note.key, note.value = "imgsz", written
+        onnx.save(model, str(path))
+        assert read_onnx(path).image_size == size
 
 
 def test_what_is_no_network_is_said(tmp_path, rng):
