@@ -27,6 +27,7 @@ def trace(shown, level, start, centre, width, gap, growth, left, right):
         left[row] = right[row] = math.nan
     slope, missed, seen, unseen = 0.0, 0, 0, 0
     rows_across = height // 3
+    faintest = 0.4 * level
     for row in range(start, -1, -1):
         expected = centre + slope * (missed + 1)
         reach = 0.75 * width + 2.0 + 0.5 * missed
@@ -74,4 +75,9 @@ def trace(shown, level, start, centre, width, gap, growth, left, right):
         if best_l > 0 and best_r < columns - 1:  # a stripe that is cut off by the edge keeps its width
             width += 0.1 * ((b - a) - width)
         seen += 1
+        if level > 0.0:  # where the line fades, half-way to the ground is lower
+            total = 0.0
+            for k in range(best_l, best_r + 1):
+                total += shown[row, k]
+            level += 0.15 * (max(0.5 * total / (best_r - best_l + 1), faintest) - level)
     return seen

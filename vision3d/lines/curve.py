@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from vision3d.lines.stripes import Stripe
 
-__all__ = ["Curve", "fit_curve"]
+__all__ = ["Curve", "fit_curve", "refine_curve"]
 
 Array = NDArray[np.float64]
 ROUNDS = 4
 HUBER = 1.5
+FLOOR = 0.02  # px that a row is never better known than
+BIAS = (0.02, 0.007)  # px, of what repeats from row to row: at the curve's end, and within it
+GAP_ROWS = 6
+HIGHEST = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +31,7 @@ class Curve:
     rms : of the residuals, px
     coverage : share of the rows between bottom and middle in which the stripe was seen whole
     width_spread : how far the widths depart from a straight line in y, as a share of the width
+    criterion : Schwarz's, the smaller the better
     """
 
     bottom: float
@@ -35,46 +40,69 @@ class Curve:
     rms: float
     coverage: float
     width_spread: float
+    criterion: float
 
 
-def fit_curve(stripe: Stripe, bottom: float, middle: float) -> Curve | None:
-    """Fit a cubic by Huber's weights; None where too few rows show the stripe whole."""
+def fit_curve(stripe: Stripe, bottom: float, middle: float, degree: int = 3) -> Curve | None:
+    """Fit a polynomial by Huber's weights; None where too few rows show the stripe whole."""
     whole = np.isfinite(stripe.left) & ~stripe.cut_off
     y = np.flatnonzero(whole).astype(np.float64)
     if len(y) < 12:
         return None
     x = 0.5 * (stripe.left[whole] + stripe.right[whole])
     scale = 0.5 * (stripe.rows - 1)
-    design = np.vander((y - scale) / scale, 4, increasing=True)
-    ends = np.vander((np.array([bottom, middle]) - scale) / scale, 4, increasing=True)
-    weights = np.ones(len(y))
-    coefficients: Array = np.zeros(4)
-    residual: Array = x
+    design = np.vander((y - scale) / scale, degree + 1, increasing=True)
+    ends = np.vander((np.array([bottom, middle]) - scale) / scale, degree + 1, increasing=True)
+    coefficients, weights = _solve(design, x)
+    residual = x - design @ coefficients
+    at = ends @ coefficients
+    between = (y >= middle - 0.5) & (y <= bottom + 0.5)
+    together = _rows_that_err_together(residual)
+    spread = float(np.sum(weights * residual**2)) / max(float(weights.sum()) - degree - 1, 1.0)
+    free = len(y) / together
+    return Curve(
+        bottom=float(at[0]),
+        middle=float(at[1]),
+        cov=_covariance(design, ends, weights, spread * together),
+        rms=float(np.sqrt(np.mean(weights * residual**2))),
+        coverage=float(between.sum() / max(bottom - middle + 1.0, 1.0)),
+        width_spread=_width_spread(y, stripe.right[whole] - stripe.left[whole]),
+        criterion=free * float(np.log(spread + FLOOR**2)) + 2.0 * (degree + 1),
+    )
+
+
+def refine_curve(stripe: Stripe, bottom: float, middle: float, first: Curve) -> Curve:
+    """The polynomial of the degree that the rows speak for, by Schwarz's criterion.
+
+    Where the lowest or the highest rows are missing no more than a cubic is carried on to them.
+    """
+    seen = np.flatnonzero(np.isfinite(stripe.left) & ~stripe.cut_off)
+    cut_short = seen[-1] < bottom - GAP_ROWS or seen[0] > middle
+    curves = [
+        fit_curve(stripe, bottom, middle, degree) for degree in (1, 2, 3, 4, 5, 6)[: 3 if cut_short else 6]
+    ]
+    return min((one for one in curves if one is not None), key=lambda one: one.criterion, default=first)
+
+
+def _solve(design: Array, x: Array) -> tuple[Array, Array]:
+    """Coefficients and Huber's weights."""
+    weights = np.ones(len(x))
+    coefficients: Array = np.zeros(design.shape[1])
     for _ in range(ROUNDS):
         root = np.sqrt(weights)[:, None]
         solved = np.linalg.lstsq(root * design, root[:, 0] * x, rcond=None)[0]
         coefficients = np.asarray(solved, dtype=np.float64)
-        residual = x - design @ coefficients
-        sigma = max(1.4826 * float(np.median(np.abs(residual))), 0.02)
-        weights = np.minimum(1.0, HUBER * sigma / np.maximum(np.abs(residual), 1e-12))
-    at = ends @ coefficients
-    between = (y >= middle - 0.5) & (y <= bottom + 0.5)
-    return Curve(
-        bottom=float(at[0]),
-        middle=float(at[1]),
-        cov=_covariance(design, ends, weights, residual),
-        rms=float(np.sqrt(np.mean(weights * residual**2))),
-        coverage=float(between.sum() / max(bottom - middle + 1.0, 1.0)),
-        width_spread=_width_spread(y, stripe.right[whole] - stripe.left[whole]),
-    )
+        residual = np.abs(x - design @ coefficients)
+        sigma = max(1.4826 * float(np.median(residual)), FLOOR)
+        weights = np.minimum(1.0, HUBER * sigma / np.maximum(residual, 1e-12))
+    return coefficients, weights
 
 
-def _covariance(design: Array, ends: Array, weights: Array, residual: Array) -> Array:
-    """Of the ends; neighbouring rows err together, which the residuals tell themselves."""
+def _covariance(design: Array, ends: Array, weights: Array, variance: float) -> Array:
+    """Of the ends, from the variance of a row that errs for itself."""
     information = design.T @ (weights[:, None] * design)
-    spread = float(np.sum(weights * residual**2)) / max(len(residual) - 4, 1)
-    inverse = np.linalg.inv(information + 1e-9 * np.eye(4))
-    cov: Array = ends @ inverse @ ends.T * (spread * _rows_that_err_together(residual) + 1e-4)
+    inverse = np.linalg.inv(information + 1e-12 * np.eye(len(information)))
+    cov: Array = ends @ inverse @ ends.T * variance + np.diag(np.square(BIAS))
     return cov
 
 

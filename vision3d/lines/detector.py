@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import ShapeError
-from vision3d.lines.curve import Curve, fit_curve
+from vision3d.lines.curve import Curve, fit_curve, refine_curve
 from vision3d.lines.settings import LineReading, LineSettings, no_line
+from vision3d.lines.sharpening import sharpened
 from vision3d.lines.stripes import Stripe, find_stripes
 
 __all__ = ["find_line"]
 
 Grey = NDArray[np.uint8]
+BROAD = 0.05  # of the width of the image
+RIVAL = 0.5  # of the weight of the best stripe, from which on another one casts doubt
 
 
 def find_line(image: ArrayLike, settings: LineSettings | None = None) -> LineReading:
@@ -59,14 +62,20 @@ def find_line(image: ArrayLike, settings: LineSettings | None = None) -> LineRea
     usable = [(stripe, curve) for stripe, curve in judged if curve is not None]
     if not usable:
         return no_line("nothing darker or lighter than the ground reaches from the bottom to the middle")
-    scored = sorted(
-        ((_parts(small, stripe, curve, own), stripe, curve) for stripe, curve in usable),
-        key=lambda one: -_confidence(one[0]),
-    )
-    parts, stripe, curve = scored[0]
-    rivals = [one for one in scored[1:] if abs(one[2].bottom - curve.bottom) > 0.5 * stripe.width]
-    second = max((_confidence(one[0]) for one in rivals), default=0.0)
-    parts = parts | {"alone": float(np.clip(2.0 - 2.0 * second / max(_confidence(parts), 1e-9), 0.0, 1.0))}
+    scored = [(_parts(stripe, curve, own), stripe, curve) for stripe, curve in usable]
+    weights = [_confidence(parts) * stripe.salience for parts, stripe, _ in scored]
+    best = int(np.argmax(weights))
+    parts, stripe, curve = scored[best]
+    rivals = [
+        weight
+        for weight, (_, other, own_curve) in zip(weights, scored, strict=True)
+        if abs(own_curve.bottom - curve.bottom) > 0.5 * max(stripe.width, other.width)
+        and weight > RIVAL * weights[best]
+    ]
+    second = max(rivals, default=0.0) / max(weights[best], 1e-9)
+    parts = parts | {"alone": float(np.clip((1.0 - second) / (1.0 - RIVAL), 0.0, 1.0))}
+    stripe = sharpened(small, stripe)
+    curve = refine_curve(stripe, rows - 1.0, middle, curve)
     return _reading(grey, own, factor, top, stripe, curve, parts, len(rivals))
 
 
@@ -101,15 +110,17 @@ def _scaled(grey: Grey, own: LineSettings, factor: int) -> tuple[Grey, int]:
     return np.ascontiguousarray(small[top:]), top
 
 
-def _parts(small: Grey, stripe: Stripe, curve: Curve, own: LineSettings) -> dict[str, float]:
+def _parts(stripe: Stripe, curve: Curve, own: LineSettings) -> dict[str, float]:
     """What speaks for a stripe, each 0-1."""
 
     def ramp(value: float, none: float, full: float) -> float:
         return float(np.clip((value - none) / (full - none), 0.0, 1.0))
 
+    # a thin stripe takes more contrast to be believed: joints of tiles are thin and faint
+    wide = min(1.2, float(np.sqrt(stripe.width / (BROAD * stripe.columns))))
     return {
         "reach": ramp(curve.coverage, 0.3, 0.7),
-        "contrast": ramp(stripe.contrast / own.contrast, 0.7, 1.5),
+        "contrast": ramp(stripe.contrast * wide / own.contrast, 0.7, 1.5),
         "even width": ramp(curve.width_spread, 0.45, 0.15),
         "smooth": ramp(curve.rms / max(stripe.width, 4.0), 0.35, 0.1),
         "clear ground": ramp(stripe.share_of_edges, 0.1, 0.4),

@@ -24,7 +24,7 @@ class LineSettings:
     polarity : a line darker or lighter than the ground; auto takes the better of both
     threshold : adaptive (against the median round each pixel) or otsu (one level for all)
     window : side of the square that adaptive takes the median of, as a share of the width of the image
-    contrast : least difference between line and ground, grey levels
+    contrast : least difference between line and ground, as a share of the ground's brightness
     middle : the row that looks ahead, as a share of the height from the top
     top : nothing above this share of the height is looked at
     width : least and largest width of the line at the bottom, as shares of the image's
@@ -36,7 +36,7 @@ class LineSettings:
     polarity: Polarity = "auto"
     threshold: Literal["adaptive", "otsu"] = "adaptive"
     window: float = 0.8
-    contrast: float = 12.0
+    contrast: float = 0.15
     middle: float = 0.5
     top: float = 0.35
     width: tuple[float, float] = (0.012, 0.5)

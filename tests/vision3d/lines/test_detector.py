@@ -11,7 +11,7 @@ from vision3d.render import GroundLine, line_pixels, random_line, render_ground
 
 CAMERA = Camera("brown5", (533.0, 533.0, 342.0, 234.0), (-0.28, 0.02, 0.0012, -0.0001, 0.16), (640, 480))
 MOUNT = CameraMount(0.2, 0.5)
-ROWS = (479.0, 0.5 * 479.0)
+ROWS = (478.5, 0.5 * 479.0)  # the lowest row of the image at half its size
 
 
 def views(rng, count, **settings):
@@ -27,13 +27,17 @@ def views(rng, count, **settings):
 @pytest.mark.parametrize("threshold", ["adaptive", "otsu"])
 def test_the_line_is_found_where_it_is(threshold, rng):
     settings = LineSettings(threshold=threshold, top=0.4)
-    errors = []
+    errors, scaled = [], []
     for image, truth in views(rng, 12):
         reading = find_line(image, settings)
         assert reading.found, reading.reason
-        errors.append([reading.bottom_px[0] - truth[0], reading.middle_px[0] - truth[1]])
-    assert np.median(np.abs(errors)) < 0.4
-    assert np.max(np.abs(errors)) < 4.0
+        error = np.array([reading.bottom_px[0], reading.middle_px[0]]) - truth
+        errors.append(error)
+        scaled.append(error / np.sqrt(np.diag(reading.cov_px)))
+    assert np.median(np.abs(errors)) < 0.1
+    assert np.max(np.abs(errors)) < 0.6
+    # 40 frames of tests/benchmarks/lines.py give 1.1 and 0.9; a curve misfits some lines more than others
+    assert np.sqrt(np.mean(np.square(scaled), axis=0)).max() < 2.0
 
 
 @pytest.mark.slow
@@ -47,8 +51,8 @@ def test_the_covariance_is_that_of_the_noise(rng):
     x = np.array([(one.bottom_px[0], one.middle_px[0]) for one in readings])
     told = np.mean([np.diag(one.cov_px) for one in readings], axis=0)
     ratio = x.var(axis=0, ddof=1) / told
-    assert (ratio < 1.6).all(), "60 images: sd of the ratio is 0.18; it holds the misfit of the curve too"
-    assert (ratio > 0.05).all()
+    assert (ratio < 1.6).all(), "60 images: sd of the ratio is 0.18"
+    assert (ratio > 0.2).all(), "it holds the misfit of the curve too"
 
 
 def test_dark_and_light_are_told_apart(rng):
