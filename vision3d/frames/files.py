@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError
 
-__all__ = ["IMAGE_SUFFIXES", "find_images", "is_pattern", "require_path", "stamps_of"]
+__all__ = ["IMAGE_SUFFIXES", "find_images", "is_pattern", "named_by_time", "require_path", "stamps_of"]
 
 IMAGE_SUFFIXES = frozenset(
     (".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp")
@@ -87,6 +87,11 @@ def stamps_of(paths: list[Path], fps: float | None, default: float) -> tuple[NDA
             return times - times[0], 1e9 * (len(times) - 1) / float(times[-1] - times[0])
     rate = fps or default
     return np.round(np.arange(len(paths)) * (1e9 / rate)).astype(np.int64), rate
+
+
+def named_by_time(paths: list[Path]) -> bool:
+    """Whether the names of several files are times: they are the frames of a video then."""
+    return len(paths) > 1 and all(_named_time(path.stem) is not None for path in paths)
 
 
 def _named_time(stem: str) -> int | None:

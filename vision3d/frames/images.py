@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import FileFormatError
-from vision3d.frames.files import stamps_of
+from vision3d.frames.files import named_by_time, stamps_of
 from vision3d.frames.source import FrameSource, in_colour, quiet
 
 __all__ = ["ImageFrames"]
@@ -23,6 +23,7 @@ class ImageFrames(FrameSource):
     def __init__(self, name: str, paths: list[Path], fps: float | None, *, loop: bool) -> None:
         self._paths = paths
         self._t_ns, rate = stamps_of(paths, fps, FOLDER_FPS)
+        self.stills = not named_by_time(paths)
         first = next((image for path in paths if (image := _read(path)) is not None), None)
         if first is None:
             raise FileFormatError(f"none of the {len(paths)} images of {name} can be read; are they images?")

@@ -26,12 +26,14 @@ class Frame:
     t_ns : since the first frame, by the clock of the source: arrival of a camera's, the stamp in a video
     image : (h, w, 3) uint8 BGR, read-only
     name : of the file, or `frame 17`
+    still : a photograph, which has nothing to do with the frame before; not one of a video
     """
 
     index: int
     t_ns: int
     image: NDArray[np.uint8]
     name: str
+    still: bool = False
 
     @cached_property
     def grey(self) -> NDArray[np.uint8]:
@@ -51,11 +53,12 @@ class FrameSource(ABC):
     fps : frames a second, nominal
     count : of frames, where the source knows it
     live : frames come when they come; a source that is not can be read as quickly as the reader wants
+    stills : frames are photographs
     fault : why it broke off; empty where it did not
     left_out : sentences about single frames that could not be used
     """
 
-    live = False
+    live = stills = False
 
     def __init__(
         self, name: str, size: tuple[int, int], fps: float, count: int | None, *, loop: bool
@@ -79,7 +82,7 @@ class FrameSource(ABC):
                 for t_ns, name, image in self._lap():
                     image.flags.writeable = False
                     last_ns = max(t_ns, last_ns + 1)
-                    yield Frame(index, lap_ns + last_ns, image, name or f"frame {index}")
+                    yield Frame(index, lap_ns + last_ns, image, name or f"frame {index}", self.stills)
                     index += 1
                 if last_ns < 0 or not self.loop or self.fault:
                     return

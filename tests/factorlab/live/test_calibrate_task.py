@@ -224,3 +224,16 @@ def test_the_other_tasks_know_the_camera_that_was_saved(held, tmp_path):
         assert tasks["line"]._ground.camera.lens == "brown2"
     finally:
         tasks["calibrate"].close()
+
+
+def test_photographs_of_a_folder_are_views_at_once(live, data_dir, tmp_path):
+    """OpenCV's left01-14: every picture is taken, and the camera is that of factorlab calibrate camera."""
+    settings = TaskSettings(board=Checkerboard(9, 6, 0.025), lens="brown5", folder=tmp_path)
+    pictures = f"{data_dir}/vision/opencv/left*.jpg"
+    session, _ = live(pictures, "calibrate", settings=settings, fast=True)
+    session.start()
+    wait_for(lambda: session.ended and not session.task.desk.now.busy)
+    standing = session.task.desk.now
+    assert len(standing.views) == 13
+    assert standing.calibration.rms_px < 0.2
+    assert standing.calibration.camera.intrinsics[0] == pytest.approx(533, abs=2)

@@ -177,3 +177,11 @@ def test_a_camera_without_frames_is_not_opened(monkeypatch):
     monkeypatch.setattr(Unplugged, "frames", 0)
     with pytest.raises(CameraLostError, match="camera 0 is there but gives no frame"):
         open_frames("0")
+
+
+def test_photographs_are_told_from_frames(video, folder, tmp_path):
+    assert all(frame.still for frame in open_frames(folder))
+    assert not any(frame.still for frame in open_frames(video))
+    for stamp in ("1305031102.175304", "1305031102.211214"):
+        cv2.imwrite(str(tmp_path / f"{stamp}.png"), picture(1))
+    assert not any(frame.still for frame in open_frames(f"{tmp_path}/*.png"))

@@ -18,6 +18,7 @@ WIDTH_PX = 640  # a wider image is halved until it is no wider: a watch has to b
 STILL_PX_S = 12.0  # mean speed of the corners of a board that is held still, in an image of that width
 STILL_S = 0.25
 NEW_SHARE = 0.03  # of the image's width that corners have moved, on the mean, in a pose that is new
+SAME_SHARE = 0.002  # photographs that differ by less are the same one, in a folder that plays again
 FEWEST = 6
 
 
@@ -31,12 +32,14 @@ class SeenBoard:
     pixels : (N, 2) to a pixel or so
     speed_px_s : mean speed of the corners; infinite in the first frame
     still : it has been held still for a while
+    photograph : it is in a picture of its own, which somebody chose to take
     """
 
     ids: NDArray[np.int64]
     pixels: Array
     speed_px_s: float
     still: bool
+    photograph: bool = False
 
 
 class BoardWatch:
@@ -72,8 +75,8 @@ class BoardWatch:
             self._rest_ns = None
         elif self._rest_ns is None:
             self._rest_ns = frame.t_ns
-        still = self._rest_ns is not None and frame.t_ns - self._rest_ns >= STILL_S * 1e9
-        return SeenBoard(ids, pixels, float(speed), still)
+        rested = self._rest_ns is not None and frame.t_ns - self._rest_ns >= STILL_S * 1e9
+        return SeenBoard(ids, pixels, float(speed), rested or frame.still, frame.still)
 
     def forget(self) -> None:
         """Begin anew: the next frame has nothing before it."""
@@ -82,7 +85,8 @@ class BoardWatch:
     @staticmethod
     def is_new(seen: SeenBoard, kept: list[SeenBoard], width: int) -> bool:
         """Whether the board is elsewhere, or turned otherwise, than in every view that was kept."""
-        return all(motion(one.ids, one.pixels, seen.ids, seen.pixels) > NEW_SHARE * width for one in kept)
+        share = SAME_SHARE if seen.photograph else NEW_SHARE
+        return all(motion(one.ids, one.pixels, seen.ids, seen.pixels) > share * width for one in kept)
 
 
 def motion(ids_a: NDArray[np.int64], a: Array, ids_b: NDArray[np.int64], b: Array) -> float:
