@@ -1,4 +1,4 @@
-"""The pose of a flat object from a few of its points: both minima of the reprojection error.
+"""The pose of a flat object from a few of its points: reprojection error, and descent along a tangent.
 
 One small object: points X (N, 3) in its own frame, their mean at the origin, all at z = 0 (nearly).  A point
 p = R X + t in the camera frame was seen along a ray, and the residual of its pixel is
@@ -11,9 +11,7 @@ exactly the reprojection error of a pinhole, and for any other lens its linearis
 Residuals are whitened in blocks of b: W (2 N / b, b, b), lower triangular; W r has unit covariance.
 
 The tangent of a pose is that of `sequential.manifold.SE3`: R <- R Exp(w), t <- t + R v; in it the normal
-equations of a step are H ξ = -g.  Weak perspective leaves a flat object two readings, mirror images about
-the line of sight (Schweighofer and Pinz 2006, "Robust pose estimation from a planar target"); `two_minima`
-descends into both.
+equations of a step are H ξ = -g.
 """
 
 from __future__ import annotations
@@ -24,10 +22,7 @@ import numpy as np
 
 from vision3d.kernels import inlined, kernel
 
-__all__ = ["cholesky", "descend", "normal_equations", "rotate_right", "two_minima"]
-
-ITERATIONS = 100
-SAME = 1e-3  # minima closer than this (rad) and than a twentieth of a sigma are one
+__all__ = ["cholesky", "descend", "normal_equations", "rotate_right", "solve"]
 
 
 @inlined
@@ -160,7 +155,7 @@ def descend(R, t, X, n, A, W, first, iterations, enough, rows, H):
     chi2 = normal_equations(R, t, X, n, A, W, rows, H, g)
     if not chi2 < math.inf:
         return math.inf
-    damping = 0.0 if first else 1e-3
+    damping = 0.0
     for _ in range(iterations):
         if math.isnan(cholesky(H, first, damping, L)):
             damping = max(10.0 * damping, 1e-6)
@@ -193,71 +188,3 @@ def descend(R, t, X, n, A, W, first, iterations, enough, rows, H):
             if damping > 1e8:
                 break
     return chi2
-
-
-@inlined
-def mirrored(R, t, out):
-    """The other reading under weak perspective: depths reversed along the line of sight to the centre."""
-    norm = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-    for j in range(2):
-        along = (R[0, j] * t[0] + R[1, j] * t[1] + R[2, j] * t[2]) / norm
-        for i in range(3):
-            out[i, j] = R[i, j] - 2.0 * along * t[i] / norm
-    out[0, 2] = out[1, 0] * out[2, 1] - out[2, 0] * out[1, 1]
-    out[1, 2] = out[2, 0] * out[0, 1] - out[0, 0] * out[2, 1]
-    out[2, 2] = out[0, 0] * out[1, 1] - out[1, 0] * out[0, 1]
-
-
-@inlined
-def settle(R, t, X, n, A, W, rows, H):
-    """Descend to the nearest minimum: the normal first stays as it is, then everything moves."""
-    chi2 = descend(R, t, X, n, A, W, 2, 12, 1e-4, rows, H)
-    return descend(R, t, X, n, A, W, 0, ITERATIONS, 1e-10, rows, H) if chi2 < math.inf else math.inf
-
-
-@inlined
-def exchange(R, t, chi2, H):
-    """Put the second minimum first."""
-    chi2[0], chi2[1] = chi2[1], chi2[0]
-    for i in range(3):
-        t[0, i], t[1, i] = t[1, i], t[0, i]
-        for j in range(3):
-            R[0, i, j], R[1, i, j] = R[1, i, j], R[0, i, j]
-    for i in range(6):
-        for j in range(6):
-            H[0, i, j], H[1, i, j] = H[1, i, j], H[0, i, j]
-
-
-@inlined
-def same_tilt(R):
-    """Whether two minima have one normal."""
-    cosine = R[0, 0, 2] * R[1, 0, 2] + R[0, 1, 2] * R[1, 1, 2] + R[0, 2, 2] * R[1, 2, 2]
-    return cosine > math.cos(SAME)
-
-
-@kernel("i8(f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[::1], f8[:,:,::1])")
-def two_minima(X, n, A, W, R, t, chi2, H):
-    """Descend from R[0], t[0] and from its mirror image; the better minimum comes first.
-
-    R (2, 3, 3), t (2, 3), chi2 (2,) and H (2, 6, 6) are filled; returns how many minima there are.
-    """
-    rows = np.empty((2 * W.shape[1], 7))
-    mirrored(R[0], t[0], R[1])
-    for i in range(3):
-        t[1, i] = t[0, i]
-    for m in range(2):
-        chi2[m] = settle(R[m], t[m], X, n, A, W, rows, H[m])
-    for _ in range(2):  # the first starts may have led to one place: mirror what is better once more
-        if chi2[1] < chi2[0]:
-            exchange(R, t, chi2, H)
-        if not chi2[0] < math.inf:
-            return 0
-        if chi2[1] < math.inf and not same_tilt(R):
-            return 2
-        mirrored(R[0], t[0], R[1])
-        for i in range(3):
-            t[1, i] = t[0, i]
-        chi2[1] = settle(R[1], t[1], X, n, A, W, rows, H[1])
-    if chi2[1] < chi2[0]:
-        exchange(R, t, chi2, H)
-    return 1 if same_tilt(R) or not chi2[1] < math.inf else 2

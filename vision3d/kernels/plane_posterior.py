@@ -1,6 +1,6 @@
 """The pose of a flat object as two modes with their weights, by integration over its tilt.
 
-The two minima of `plane_pose` are compared by the probability around each, not by their residuals: the
+The two minima of `plane_minima` are compared by the probability around each, not by their residuals: the
 density of the tilt (the other four coordinates are integrated out by Laplace's method) is summed over a grid
 that covers both basins, which are parted where the line between the minima is lowest.  Where a minimum is
 sharp and far from the other, Laplace's method alone does the same for less.
@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from vision3d.kernels import inlined, kernel
-from vision3d.kernels.plane_pose import cholesky, rotate_right, solve, two_minima
+from vision3d.kernels.plane_minima import two_minima
+from vision3d.kernels.plane_pose import cholesky, rotate_right, solve
 from vision3d.kernels.tilt_chart import log_density, moments, sight_frame, tilt_of
 
 __all__ = ["posterior"]

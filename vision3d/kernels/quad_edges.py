@@ -5,8 +5,7 @@ blur that is symmetric moves that place nowhere, noise is averaged over hundreds
 about the fitted line says what the line is worth.  A corner is where two lines meet; since neighbours
 share a line, the covariance is one matrix for all four corners, (8, 8), order x0 y0 x1 y1 …
 
-Image rows are y, columns are x, the centre of the first pixel is (0, 0).  Corners run clockwise as seen in
-the image (y down), so that the outward normal of a side of direction (dx, dy) is (dy, -dx).
+Corners run clockwise as seen in the image (y down): the outward normal of a side (dx, dy) is (dy, -dx).
 """
 
 from __future__ import annotations
@@ -30,8 +29,7 @@ MOST = 400  # places along a side
 @inlined
 def grey(image, x, y):
     """Bilinear grey level; -1 outside."""
-    h, w = image.shape
-    if not (x >= 0.0 and y >= 0.0 and x < w - 1 and y < h - 1):
+    if not (x >= 0.0 and y >= 0.0 and x < image.shape[1] - 1 and y < image.shape[0] - 1):
         return -1.0
     j, i = int(x), int(y)
     a, b = x - j, y - i
@@ -98,10 +96,8 @@ def fit_curve(places, offsets, count, length, bend, bend_sigma, found, cov):
     scatter, used = 0.5, count
     found[0], found[1], found[2] = 0.0, 0.0, bend
     for turn in range(6):
-        for i in range(3):
-            g[i] = 0.0
-            for j in range(3):
-                H[i, j] = 0.0
+        H[:] = 0.0
+        g[:] = 0.0
         used = 0
         for k in range(count):
             u = places[k] / length - 0.5
@@ -136,9 +132,7 @@ def fit_curve(places, offsets, count, length, bend, bend_sigma, found, cov):
                 kept += 1
         scatter = max(math.sqrt(squares / max(1, kept - 2)), 0.01)
     found[3] = scatter
-    for i in range(3):
-        for j in range(3):
-            cov[i, j] *= scatter * scatter
+    cov *= scatter * scatter
     return used
 
 
@@ -236,6 +230,21 @@ def refine_quad(image, quad, halves, bends, floors, responses, noise, corners, c
     return True
 
 
+@inlined
+def blur_of(half, response):
+    """Sigma of the slope whose window of +- half answers with this share of a shift, px."""
+    low, high = 0.2, 3.0
+    for _ in range(18):
+        middle = 0.5 * (low + high)
+        x = half / middle
+        slope = math.sqrt(2.0 / math.pi) * x * math.exp(-0.5 * x * x)
+        if 1.0 - slope / math.erf(x / math.sqrt(2.0)) > response:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
 @kernel("void(u1[:,::1], f8[:,:,::1], f8[:,::1], i8, f8[::1], f8, f8[:,:,::1], f8[:,:,::1], b1[::1])")
 def refine_quads(image, quads, bends, cells, noise, reach_px, corners, covs, refined):
     """Refine quadrilaterals (M, 4, 2) of `cells` cells a side, borders included.
@@ -261,9 +270,9 @@ def refine_quads(image, quads, bends, cells, noise, reach_px, corners, covs, ref
                 px, py = quads[m, (k + i) % 4, 0] - x, quads[m, (k + i) % 4, 1] - y
                 across += 0.5 * abs(px * dy - py * dx) / max(length, 1e-9)
             cell[k] = across / cells
-            widest[k] = min(max(0.75 * cell[k], SHORTEST_PX), LONGEST_PX)
+            widest[k] = min(max(0.5 * cell[k], SHORTEST_PX), LONGEST_PX)
             halves[k] = min(max(0.7 * cell[k], 1.5), 3.0)
-            floors[k] = noise[0] + 0.3 * math.exp((1.5 - cell[k]) / 0.6)
+            floors[k] = noise[0]
             start[k, 0], start[k, 1] = x, y
         reach = max(reach_px, 0.085 * around / cells)
         for turn in range(ROUNDS):
@@ -280,6 +289,8 @@ def refine_quads(image, quads, bends, cells, noise, reach_px, corners, covs, ref
                 break
             for k in range(4):
                 start[k, 0], start[k, 1] = corners[m, k, 0], corners[m, k, 1]
+                blurs = cell[k] / blur_of(halves[k], responses[k])  # what lies beyond the next edge shines in
+                floors[k] = noise[0] + 0.12 * math.exp(2.2 - blurs)
                 if turn == 0:
                     halves[k] = min(widest[k], USUAL_PX)
                 elif responses[k] < 0.75:

@@ -33,6 +33,10 @@ BIRTH = float(np.log(1e-3 / (8.0 * np.pi**2 * 10.0)) + 3.0 * np.log(2.0 * np.pi)
 """Log density of a marker that is anywhere: one time in a thousand it was moved unseen, within 10 m³."""
 LEAST_LOG_WEIGHT = float(np.log(1e-7))
 TINY = 1e-300
+DOUBT = 0.02
+"""No picture says less of a reading: corners of a picture may be wrong together."""
+FLIP = float(np.log(1e-4))
+"""The chance that what was followed until now was the mirror image."""
 COASTING_S = 0.25  # a break this long takes the velocity away
 SAME = 2.0  # squared Mahalanobis distance below which two hypotheses are one
 REPEATED = 0.2
@@ -160,21 +164,27 @@ class MarkerTracker:
         if not seen:
             return []
         gaps = np.array([self.t - self.tracks[number].last > COASTING_S for number in seen])
-        pairs, poses, covs, evidence, owners = [], [], [], [], []
+        pairs, poses, covs, evidence, owners, modes = [], [], [], [], [], []
         for number, ahead in self._predicted(list(seen), ~gaps):
             marker, measured = seen[number]
             moved = float(np.sqrt(np.mean((marker.corners - self.tracks[number].corners) ** 2)))
             worth = REPEATED + (1.0 - REPEATED) * min(1.0, moved)
-            for mode in measured.modes:
+            odds = np.log([max(mode.probability, DOUBT) for mode in measured.modes])
+            for k, mode in enumerate(measured.modes):
                 pairs.append(ahead)
                 poses += [mode.camera_T_marker] * len(ahead)
                 covs += [mode.cov] * len(ahead)
-                evidence += [worth * np.log(max(mode.probability, TINY))] * len(ahead)
+                evidence += [worth * odds[k]] * len(ahead)
                 owners += [number] * len(ahead)
+                modes += [k] * len(ahead)
         reading = np.array(poses), np.array(covs), np.array(evidence)
         moved_on = updated(Hypotheses.joined(pairs), *reading)
         anew = born(*reading[:2], reading[2] + BIRTH, self.motion)
         both, owner = Hypotheses.joined([moved_on, anew]), np.array(owners * 2)
+        turned = _turned(moved_on, anew, reading[2], np.array(owners), np.array(modes))
+        both = both.weighing(
+            np.logaddexp(both.log_weight, np.concatenate([np.full(len(turned), -np.inf), turned]))
+        )
         told = []
         for number, (marker, measured) in seen.items():
             track = self.tracks[number]
@@ -203,6 +213,21 @@ class MarkerTracker:
         return TrackedMarker(
             number, pose, marker is not None, self.t - track.begun, measured, marker, found.velocity[0]
         )
+
+
+def _turned(
+    moved_on: Hypotheses, anew: Hypotheses, evidence: Array, owner: NDArray[np.int_], mode: NDArray[np.int_]
+) -> Array:
+    """Log weights of the other reading of a marker, had the mirror image been followed until now."""
+    weights = np.full(len(anew), -np.inf)
+    for number in np.unique(owner):
+        rows = np.flatnonzero(owner == number)
+        best = rows[int(np.argmax(moved_on.log_weight[rows]))]
+        other = rows[mode[rows] != mode[best]]
+        if len(other):
+            gain = evidence[other[0]] - evidence[best]
+            weights[other[0]] = moved_on.log_weight[best] + gain + FLIP
+    return weights
 
 
 def _reduced(found: Hypotheses) -> Hypotheses:
