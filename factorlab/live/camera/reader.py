@@ -27,7 +27,7 @@ class FrameReader:
     """Puts frames where the worker takes them.
 
     A file plays at its own speed, and frames for which the worker has no time are passed over, as with a
-    camera; with `fast` it plays as quickly as the worker takes every frame.
+    camera; with `fast` it plays as quickly as the worker takes every frame.  No photograph is passed over.
 
     Parameters
     ----------
@@ -116,7 +116,8 @@ class FrameReader:
         self._taken(captured)
         self.count += 1
         self.frames.put(captured)
-        while self._fast and not (self._stop.is_set() or self.frames.wait_taken(0.2)):
+        every = self._fast or self.source.stills
+        while every and not (self._stop.is_set() or self.frames.wait_taken(0.2)):
             pass
 
     def _in_time(self, frame: Frame, start_ns: int) -> int:

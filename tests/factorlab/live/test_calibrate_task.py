@@ -230,7 +230,7 @@ def test_photographs_of_a_folder_are_views_at_once(live, data_dir, tmp_path):
     """OpenCV's left01-14: every picture is taken, and the camera is that of factorlab calibrate camera."""
     settings = TaskSettings(board=Checkerboard(9, 6, 0.025), lens="brown5", folder=tmp_path)
     pictures = f"{data_dir}/vision/opencv/left*.jpg"
-    session, _ = live(pictures, "calibrate", settings=settings, fast=True)
+    session, _ = live(pictures, "calibrate", settings=settings)
     session.start()
     wait_for(lambda: session.ended and not session.task.desk.now.busy)
     standing = session.task.desk.now
