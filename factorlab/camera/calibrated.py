@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from factorlab.camera.fitting import Fitted
     from vision3d.boards import Board
     from vision3d.calibrate import (
         Calibration,
@@ -41,6 +42,8 @@ class CameraSettings:
     lens : a name of `vision3d.camera.LENSES`, or `"auto"`
     window : half-width of the corner refinement, px; None lets every corner have its own
     robust : leave out corners that noise does not explain
+    shape : of the board: `"flat"`, `"bent"` (how far is estimated), or `"auto"`: bent where that predicts
+        left-out pictures better
     frames : how many frames are taken from a video
     compare : a file with another calibration of the same camera
     next_pose : look for the most useful next pose of the board
@@ -50,6 +53,7 @@ class CameraSettings:
     lens: str = "auto"
     window: int | None = None
     robust: bool = True
+    shape: Literal["auto", "flat", "bent"] = "auto"
     frames: int = 40
     compare: Path | None = None
     next_pose: bool = True
@@ -61,7 +65,7 @@ class CalibratedCamera:
 
     Parameters
     ----------
-    choice : the lenses that were tried
+    fitted : the calibration, the lenses that were tried, and whether the board is flat
     cross : every view predicted from the others
     following : where the board would tell most next
     difference : from the calibration to compare with
@@ -71,12 +75,21 @@ class CalibratedCamera:
     settings: CameraSettings
     pictures: ImageSet
     detections: Detections
-    calibration: Calibration
-    choice: LensChoice | None
+    fitted: Fitted
     cross: LeaveOneOut | None
     following: NextPose | None
     difference: DifferenceMap | None
     seconds: dict[str, float]
+
+    @property
+    def calibration(self) -> Calibration:
+        """The answer."""
+        return self.fitted.calibration
+
+    @property
+    def choice(self) -> LensChoice | None:
+        """The lenses that were tried; None where one was asked for, or views are too few."""
+        return self.fitted.choice
 
     @property
     def given(self) -> int:

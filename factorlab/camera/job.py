@@ -9,10 +9,10 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from factorlab.camera.calibrated import CalibratedCamera, CameraSettings
+from factorlab.camera.fitting import FEWEST, fitted
 from sequential.errors import DataError
 
 if TYPE_CHECKING:
-    from vision3d.calibrate import Calibration, LensChoice
     from vision3d.camera import Camera
     from vision3d.images import ImageSet
     from vision3d.views import Detections
@@ -21,8 +21,6 @@ __all__ = ["calibrate_held", "calibrate_pictures"]
 
 Say = Callable[[str], None]
 Progress = Callable[[str, int, int], None]  # what is being done, how much of it, out of how much
-FEWEST = 3  # views of which none can be left out
-FEW_LENS = "brown2"
 
 
 def silent(text: str, done: int = 0, total: int = 0) -> None:
@@ -90,12 +88,13 @@ def calibrate_held(
         detections = detected(pictures, settings, say, progress)
     progress("the lens", len(pictures), len(pictures))
     with timed(seconds, "lens"):
-        choice, fit = _fitted(detections, settings, say)
+        found = fitted(detections.views, settings, say)
+        fit = found.calibration
     with timed(seconds, "checks"):
         cross = leave_one_out(fit) if len(fit.views) > FEWEST else None
         following = next_pose(fit, settings.board) if settings.next_pose else None
         apart = None if other is None else difference(fit, other)
-    return CalibratedCamera(settings, pictures, detections, fit, choice, cross, following, apart, seconds)
+    return CalibratedCamera(settings, pictures, detections, found, cross, following, apart, seconds)
 
 
 def detected(pictures: ImageSet, settings: CameraSettings, say: Say, progress: Progress) -> Detections:
@@ -120,23 +119,6 @@ def detected(pictures: ImageSet, settings: CameraSettings, say: Say, progress: P
         why = " ".join(detections.findings) or (detections.missed[0].reason if detections.missed else "")
         raise DataError(f"none of {len(pictures)} pictures shows a {settings.board.name}: {why}")
     return detections
-
-
-def _fitted(
-    detections: Detections, settings: CameraSettings, say: Say
-) -> tuple[LensChoice | None, Calibration]:
-    """The calibration with the lens asked for, or with the one that predicts best."""
-    from vision3d.calibrate import calibrate, choose_lens
-
-    views = detections.views
-    if settings.lens == "auto" and len(views) > FEWEST:
-        choice = choose_lens(views, robust=settings.robust)
-        return choice, choice.calibration
-    lens = FEW_LENS if settings.lens == "auto" else settings.lens
-    fit = calibrate(views, lens, robust=settings.robust)
-    if settings.lens == "auto":
-        say(f"{len(views)} pictures are too few to choose a lens by: {FEW_LENS} was taken")
-    return None, fit
 
 
 @contextmanager

@@ -42,6 +42,13 @@ def numbers_of(done: CalibratedCamera) -> dict[str, Any]:
             "pictures": [fit.views[view].name for view in fit.outlier_views],
         },
         "lenses": _lenses(done),
+        "board_warp": {
+            "estimated": bool(fit.warp_std.any()),
+            "rise_m": fit.warp.tolist(),
+            "std_m": fit.warp_std.tolist(),
+            "flat_left_out_rms_px": done.fitted.flat_px,
+        },
+        "inflation": fit.inflation,
         "uncertainty": _uncertainty(done),
         "coverage": done.coverage.bars | {"advice": list(done.coverage.advice)},
         "next_pose": _following(done),

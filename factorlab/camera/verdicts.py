@@ -15,13 +15,22 @@ STEEP, FLAT = np.radians(25.0), np.radians(12.0)  # largest tilt of the board: g
 GOOD_PLACE, FAIR_PLACE = 0.001, 0.01  # σ of a projection where it is worst, over the image's diagonal
 GOOD_SCATTER, FAIR_SCATTER = 0.5, 1.5  # RMS of residuals, px
 ENOUGH_VIEWS = 8
+CERTAIN, SCATTERED = 3.0, 3.2  # σ of a bend; scatter of the pictures over that of independent corners
 TILT_MORE = "tilt the board by 30 to 45° about its vertical and its horizontal axis"
 
 
 def verdicts_of(done: CalibratedCamera) -> tuple[Verdict, ...]:
     """Pictures, corners, residuals, left-out views, lens, uncertainty, poses: in the order of a reader."""
     found = [_pictures(done), *_window(done), *_corners(done), _residuals(done)]
-    found += [*_left_out(done), *_lens(done), _fold(done), _focal(done), *_projection(done)]
+    found += [
+        *_left_out(done),
+        *_lens(done),
+        *_shape(done),
+        _agreement(done),
+        _fold(done),
+        _focal(done),
+        *_projection(done),
+    ]
     found += [_tilt(done), _coverage(done), *_following(done), *_apart(done), *_others(done)]
     return tuple(found)
 
@@ -102,6 +111,42 @@ def _lens(done: CalibratedCamera) -> list[Verdict]:
     if done.choice is None:
         return []
     return [Verdict("lens model", done.choice.chosen, None, "INFO", done.choice.why)]
+
+
+def _shape(done: CalibratedCamera) -> list[Verdict]:
+    """Whether the board is flat."""
+    fit, flat_px = done.calibration, done.fitted.flat_px
+    if not fit.warp_std.any():
+        return []
+    axis = int(np.argmax(np.abs(fit.warp)))
+    bend, sigma = 1e3 * float(fit.warp[axis]), 1e3 * float(fit.warp_std[axis])
+    meaning = (
+        f"± {sigma:.2f} mm: along its {'columns' if axis else 'rows'} the middle of the board stands "
+        f"{'behind' if bend > 0 else 'before'} its ends"
+    )
+    if flat_px is not None:
+        meaning += f"; taken into account, since a flat one predicts left-out pictures to {flat_px:.3f} px"
+    action = "glue it to a rigid plate" if abs(bend) > CERTAIN * sigma else ""
+    return [
+        Verdict("bend of the board", abs(bend), None, "WARN" if action else "INFO", meaning, action, "mm")
+    ]
+
+
+def _agreement(done: CalibratedCamera) -> Verdict:
+    """Whether the pictures ask for one camera."""
+    times = done.calibration.inflation
+    if times <= 1.0:
+        meaning = "they scatter no more than independent corners do"
+        return Verdict("pictures against each other", times, None, "PASS", meaning, unit="σ")
+    meaning = (
+        "the corners of one picture err together: pictures ask for cameras that differ by this many σ of "
+        "independent corners; every σ told here takes that in"
+    )
+    status: Status = "INFO" if times < SCATTERED else "WARN"
+    action = (
+        "" if times < SCATTERED else "one camera, focus and zoom fixed? A flat board? The right lens model?"
+    )
+    return Verdict("pictures against each other", times, None, status, meaning, action, "σ")
 
 
 def _fold(done: CalibratedCamera) -> Verdict:
