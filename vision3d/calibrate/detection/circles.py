@@ -20,9 +20,12 @@ __all__ = ["find_circle_grid"]
 
 Grey = NDArray[np.uint8]
 
-TOLD_PX = 0.1
+TOLD_PX = 0.5
 """Perspective bias from which on its correction is said."""
 FILLED = 0.7
+STIFF, DOUBT = 0.2, 0.5
+"""A lens that hardly bends, and what share of the difference that it makes to the bias counts as its sigma:
+at the rim of a tilted grid, the grid alone does not tell how much the lens bends."""
 OUTER = 1.7
 """How far out a circle's pixels are looked at, in radii, and never past the middle between two circles."""
 
@@ -81,16 +84,19 @@ def _fitted(grey: Grey, starts: Array, ids: Ids, board: CircleGrid) -> tuple[Ref
     n = len(ids)
     centres, covs, facts = np.empty((n, 2)), np.empty((n, 3)), np.empty((n, 8))
     at, bias = np.array(starts, dtype=np.float64), np.zeros((n, 2))
+    doubt = np.zeros(n)
     good = np.zeros(n, dtype=np.bool_)
     for _ in range(2):
         smooth = fit_smooth(board.points[ids], at, (grey.shape[1], grey.shape[0]))
         if smooth is None:
             raise ModelError(f"a grid of circles has at least four, got {n}")
         bias, shapes = circle_images(smooth.at, plane, radius)
+        if (stiff := fit_smooth(board.points[ids], at, (grey.shape[1], grey.shape[0]), STIFF)) is not None:
+            doubt = DOUBT * np.linalg.norm(circle_images(stiff.at, plane, radius)[0] - bias, axis=1)
         fit_discs(image, np.ascontiguousarray(at + bias), shapes, outer, centres, covs, facts)
         good = _believable(facts, shapes)
         at = np.where(good[:, None], centres - bias, at)
-    sigma = np.sqrt(0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2)
+    sigma = np.sqrt(0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2 + doubt**2)
     at[~good], sigma[~good] = np.nan, np.nan
     det = np.maximum(facts[:, 5] * facts[:, 7] - facts[:, 6] ** 2, 1e-12)
     reach = (outer - 1.0) / np.sqrt(np.sqrt(det))

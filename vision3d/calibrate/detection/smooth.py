@@ -21,6 +21,7 @@ RADIAL_FROM = 20
 STEPS, ROBUST_STEPS = 40, 8
 """Least squares to its end first: points that a half-way model cannot explain would lose their weight."""
 MOST_FREE = 0.9
+BEND = 2.0
 PRIOR_PX = 0.05
 """A centre off the middle by a quarter of the image's radius weighs as much as this error of a point."""
 
@@ -53,8 +54,11 @@ class Smooth:
         return self.middle - r * self.radius
 
 
-def fit_smooth(points: Array, pixels: Array, size: tuple[int, int]) -> Smooth | None:
-    """Fit the model to points (N, 3) m and pixels (N, 2); None for fewer than four."""
+def fit_smooth(points: Array, pixels: Array, size: tuple[int, int], bend: float = BEND) -> Smooth | None:
+    """Fit the model to points (N, 3) m and pixels (N, 2); None for fewer than four.
+
+    `bend` is the standard deviation of the coefficients of the distortion, at the corners of the image.
+    """
     n = len(pixels)
     if n < 4:
         return None
@@ -66,7 +70,7 @@ def fit_smooth(points: Array, pixels: Array, size: tuple[int, int]) -> Smooth | 
     free = 14 if n >= RADIAL_FROM else 8
     q = np.concatenate([_homography(flat, target), np.zeros(6)])
     prior = np.zeros(free)
-    prior[8:] = (PRIOR_PX / radius / np.array([10.0, 10.0, 10.0, 10.0, 0.25, 0.25])[: free - 8]) ** 2
+    prior[8:] = (PRIOR_PX / radius / np.array([bend, bend, bend, bend, 0.25, 0.25])[: free - 8]) ** 2
     weights = np.ones(n)
     q = _solved(q, flat, target, weights, prior)
     for _ in range(ROBUST_STEPS):
