@@ -76,6 +76,26 @@ def colour_detector(path, *, rows_first=False, notes=None):
     return save(path, nodes, {"output0": (1, 6, count)}, tensors, notes=notes)
 
 
+def colour_instances(path, *, notes=None):
+    """YOLO-seg-like: rows of `colour_detector` with their scores again as coefficients of two maps."""
+    cells = grid()
+    count = cells.shape[1]
+    weights = np.array([[1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]], np.float32)[:, :, None, None]
+    nodes = [
+        helper.make_node("Conv", ["images", "weights"], ["pure"]),
+        helper.make_node("Relu", ["pure"], ["positive"]),
+        helper.make_node("AveragePool", ["positive"], ["cells"], kernel_shape=[8, 8], strides=[8, 8]),
+        helper.make_node("Reshape", ["cells", "shape"], ["scores"]),
+        helper.make_node("Concat", ["boxes", "scores", "scores"], ["output0"], axis=1),
+        helper.make_node("AveragePool", ["positive"], ["fine"], kernel_shape=[2, 2], strides=[2, 2]),
+        helper.make_node("Sub", ["fine", "half"], ["output1"]),
+    ]
+    tensors = {"weights": weights, "shape": np.array([1, 2, count], np.int64), "boxes": cells[None],
+               "half": np.array([0.4], np.float32)}  # fmt: skip
+    outputs = {"output0": (1, 8, count), "output1": (1, 2, SIZE // 2, SIZE // 2)}
+    return save(path, nodes, outputs, tensors, notes=notes)
+
+
 def colour_segmenter(path, *, softmax=False, cells=SIZE):
     """Classes background, red and blue: scores are linear in the pixel, on a map of `cells` a side."""
     weights = np.array([[0.0, 0.0, 0.0], [9.0, -9.0, -9.0], [-9.0, -9.0, 9.0]], np.float32)[:, :, None, None]

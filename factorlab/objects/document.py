@@ -183,6 +183,8 @@ def _sections(found: Found) -> list[Section]:
                 if found.way == "colour"
                 else "; on the right pixels of a class."
                 if found.way == "map"
+                else "; on the right the pixels of objects."
+                if found.mask is not None
                 else "."
             ),
         )

@@ -70,7 +70,7 @@ class Found:
     image : (h, w, 3) BGR
     way : how objects were told
     items : largest, or surest, first
-    mask : (h, w) uint8: 255 on objects of a colour, the class's number for maps; None for boxes
+    mask : (h, w) uint8: 255 on objects, the class's number for maps; None where only boxes are known
     colour, light, specks, hue : of the way by colour: the range, and how safely objects lie in it
     facts : of the way by network: file, layout, canvas
     limits : what decided: least area, least score …
@@ -160,15 +160,22 @@ def by_network(picture: str, image: Picture, model: Path, settings: NetworkSetti
         return _pieces(picture, image, network, settings, facts)
     found = network.detect(image, least_score=settings.least_score, most_overlap=settings.most_overlap)
     rows, columns = image.shape[:2]
-    items = []
+    items: list[Item] = []
+    mask: Picture | None = None
+    if found.masks is not None:
+        mask = np.where(found.masks.any(axis=0), 255, 0).astype(np.uint8)
     for k in range(len(found)):
         left, top, width, height = (float(v) for v in found.boxes[k])
         cut = left <= 0 or top <= 0 or left + width >= columns or top + height >= rows
         centre = (float(found.centres[k, 0]), float(found.centres[k, 1]))
         score = float(found.scores[k])
-        items.append(Item(found.name(k), centre, (left, top, width, height), score=score, cut=cut))
+        area = None
+        if found.masks is not None and (area := int(found.masks[k].sum())):
+            y, x = np.nonzero(found.masks[k])
+            centre = (float(x.mean()), float(y.mean()))
+        items.append(Item(found.name(k), centre, (left, top, width, height), area, score, cut))
     limits = {"least_score": settings.least_score, "most_overlap": settings.most_overlap}
-    return Found(picture, image, "boxes", tuple(items), facts=facts, limits=limits)
+    return Found(picture, image, "boxes", tuple(items), mask, facts=facts, limits=limits)
 
 
 def _pieces(

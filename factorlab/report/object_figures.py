@@ -59,9 +59,11 @@ def picture_with_objects(found: Found) -> Figure:
     if found.mask is not None:
         second = axes[0, 1]
         drawn = found.mask[::step, ::step]
-        if found.way == "colour":
+        if found.way != "map":
             second.imshow(drawn, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
-            second.set(title="pixels of the colour, cleaned")
+            second.set(
+                title="pixels of the colour, cleaned" if found.way == "colour" else "pixels of objects"
+            )
         else:
             masked = np.ma.masked_less(np.where(drawn > 0, (drawn.astype(int) - 1) % len(COLOURS), -1), 0)
             paint = ListedColormap(COLOURS)

@@ -11,6 +11,7 @@ from vision3d.objects.blobs import (
 )
 from vision3d.objects.boxes import Detections, iou, non_maximum_suppression
 from vision3d.objects.colour import ColourRange, learn_colour
+from vision3d.objects.instances import instance_masks
 from vision3d.objects.letterbox import Placement, letterbox
 from vision3d.objects.network import ObjectNetwork, Preparation, Segmentation
 from vision3d.objects.onnx_file import OnnxFile, read_onnx
@@ -35,6 +36,7 @@ __all__ = [
     "find_blobs",
     "guess_layout",
     "hue_margin",
+    "instance_masks",
     "iou",
     "largest_object",
     "learn_colour",

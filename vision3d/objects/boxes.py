@@ -7,7 +7,6 @@ centres.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,16 +29,19 @@ class Detections:
     scores : (n,) 0 to 1
     labels : (n,) int64 numbers of classes
     names : of the classes, by number; may be empty
+    masks : (n, h, w) pixels of each, where the network tells them
     """
 
     boxes: Floats
     scores: Floats
     labels: NDArray[np.int64]
     names: tuple[str, ...] = ()
+    masks: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
-        for array in (self.boxes, self.scores, self.labels):
-            array.setflags(write=False)
+        for array in (self.boxes, self.scores, self.labels, self.masks):
+            if array is not None:
+                array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -120,24 +122,8 @@ def non_maximum_suppression(
     count = object_boxes.suppress(
         np.ascontiguousarray(rows[order]), kinds[order], np.float32(most_overlap), most or len(order), kept
     )
-    chosen_ones: NDArray[np.int64] = order[kept[:count]]
-    return chosen_ones
-
-
-def chosen(
-    boxes: Floats,
-    scores: Floats,
-    labels: NDArray[np.int64],
-    names: Sequence[str],
-    *,
-    least_score: float,
-    most_overlap: float,
-) -> Detections:
-    """Candidates of a network after suppression, class by class."""
-    kept = non_maximum_suppression(
-        boxes, scores, labels=labels, least_score=least_score, most_overlap=most_overlap
-    )
-    return Detections(boxes[kept], scores[kept], labels[kept], tuple(names))
+    chosen: NDArray[np.int64] = order[kept[:count]]
+    return chosen
 
 
 def _boxes(given: ArrayLike) -> Floats:

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import DataError, FileFormatError, ShapeError
-from vision3d.objects.boxes import Detections, chosen
+from vision3d.objects.boxes import Detections, non_maximum_suppression
+from vision3d.objects.instances import instance_masks
 from vision3d.objects.letterbox import Placement, letterbox
 from vision3d.objects.onnx_file import read_onnx
 from vision3d.objects.outputs import Layout, candidates, class_scores, guess_layout
@@ -154,11 +155,17 @@ class ObjectNetwork:
         most_overlap : intersection over union of two boxes of one class that are told both
         """
         outputs, placement = self.raw(image)
-        found = candidates(outputs, self.layout(outputs), placement.canvas_size, least_score)
-        boxes = placement.to_image(found.boxes)
-        return chosen(
-            boxes, found.scores, found.labels, self.names, least_score=least_score, most_overlap=most_overlap
+        found = candidates(
+            outputs, self.layout(outputs), placement.canvas_size, least_score, classes=len(self.names)
         )
+        boxes = placement.to_image(found.boxes)
+        kept = non_maximum_suppression(
+            boxes, found.scores, labels=found.labels, least_score=least_score, most_overlap=most_overlap
+        )
+        masks, maps = None, [one for one in outputs if one.ndim == 4]
+        if found.coefficients.shape[1] and maps:
+            masks = instance_masks(found.coefficients[kept], maps[0], boxes[kept], placement)
+        return Detections(boxes[kept], found.scores[kept], found.labels[kept], self.names, masks)
 
     def segment(self, image: ArrayLike) -> Segmentation:
         """A class for every pixel of an image: its network's map, enlarged before the best class is taken."""

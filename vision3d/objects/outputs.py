@@ -8,6 +8,9 @@
     ssd-pair   (1, N, 4) and (1, N, C)   x₁ y₁ x₂ y₂ over the image's size; scores, background first
     mask       (1, C, H, W)              a score for each class at each cell; one alone: object or not
 
+Where the number of classes is known, what YOLO's rows hold beyond them is kept as coefficients (of masks in
+"-seg" models, whose second output holds the maps; of key points in others).
+
 YOLO's boxes are in pixels of the canvas.  Six numbers a row are "final" where rows are at most a thousand,
 and "yolov5" with one class where there are more; where that is wrong, the caller names the layout.
 """
@@ -31,11 +34,15 @@ MANY = 1000  # rows: grids have more cells, lists of final boxes fewer
 
 
 class Candidates(NamedTuple):
-    """Boxes of the canvas before suppression: (n, 4) left, top, width, height; (n,) scores; (n,) classes."""
+    """Boxes of the canvas before suppression: (n, 4) left, top, width, height; (n,) scores; (n,) classes.
+
+    `coefficients` (n, m) are numbers of each row beyond its classes.
+    """
 
     boxes: Floats
     scores: Floats
     labels: NDArray[np.int64]
+    coefficients: Floats
 
 
 def guess_layout(shapes: Sequence[tuple[int, ...]]) -> Layout:
@@ -46,6 +53,8 @@ def guess_layout(shapes: Sequence[tuple[int, ...]]) -> Layout:
     ShapeError
         where they belong to none that is known.
     """
+    if sorted(len(shape) for shape in shapes) == [3, 4]:  # boxes, and the maps that masks are mixed of
+        return guess_layout([shape for shape in shapes if len(shape) == 3])
     if len(shapes) == 2:
         last = sorted(shape[-1] for shape in shapes if len(shape) == 3)
         if len(last) == 2 and 4 in last:
@@ -70,7 +79,11 @@ def guess_layout(shapes: Sequence[tuple[int, ...]]) -> Layout:
 
 
 def candidates(
-    outputs: Sequence[NDArray[np.float32]], layout: Layout, canvas_size: tuple[int, int], least_score: float
+    outputs: Sequence[NDArray[np.float32]],
+    layout: Layout,
+    canvas_size: tuple[int, int],
+    least_score: float,
+    classes: int = 0,
 ) -> Candidates:
     """Boxes with a score above the least one.
 
@@ -78,15 +91,22 @@ def candidates(
     ----------
     outputs : of the network
     canvas_size : (width, height) px of its input
+    classes : how many there are; 0 where that is unknown, and all that YOLO's rows hold are classes
+
+    Raises
+    ------
+    ShapeError
+        where outputs are not of that layout, or scores not between 0 and 1.
     """
+    coefficients: Floats | None = None
     size = np.array([*canvas_size, *canvas_size], dtype=np.float64)
     match layout:
         case "yolo" | "yolov5":
             rows = _two_dimensional(outputs, layout)
             rows = rows.T if layout == "yolo" else rows
             first = 4 if layout == "yolo" else 5
-            _at_least(rows, first + 1, layout)
-            scores = rows[:, first:]
+            _at_least(rows, first + max(classes, 1), layout)
+            scores, coefficients = np.split(rows[:, first:], [classes or rows.shape[1]], axis=1)
             labels = scores.argmax(axis=1)
             best = scores[np.arange(len(rows)), labels] * (rows[:, 4] if layout == "yolov5" else 1.0)
             boxes = np.hstack([rows[:, :2] - rows[:, 2:4] / 2, rows[:, 2:4]])
@@ -107,10 +127,17 @@ def candidates(
             raise DataError(
                 f"layout {layout!r} gives no boxes; known for boxes are {', '.join(LAYOUTS[:-1])}"
             )
+    most = float(best[np.isfinite(best)].max(initial=0.0))
+    if most > 1.001:
+        raise ShapeError(
+            f"{layout}: scores run up to {most:.3g}, expected 0 to 1; the outputs are of another layout, of a"
+            " model that does more than detect (give the names of its classes), or not yet probabilities"
+        )
     kept = np.isfinite(best) & (best > least_score) & np.isfinite(boxes).all(axis=1)
     boxes = boxes[kept]
     boxes[:, 2:] = np.maximum(boxes[:, 2:], 0.0)
-    return Candidates(boxes, np.asarray(best[kept], np.float64), labels[kept].astype(np.int64))
+    more = np.zeros((len(kept), 0)) if coefficients is None else coefficients
+    return Candidates(boxes, np.asarray(best[kept], np.float64), labels[kept].astype(np.int64), more[kept])
 
 
 def class_scores(outputs: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
@@ -152,7 +179,8 @@ def _pair(outputs: Sequence[NDArray[np.float32]], size: Floats) -> tuple[Floats,
 
 
 def _two_dimensional(outputs: Sequence[NDArray[np.float32]], layout: Layout) -> Floats:
-    found = np.asarray(outputs[0], np.float64)
+    tables = [one for one in outputs if one.ndim == 3] or list(outputs)
+    found = np.asarray(tables[0], np.float64)
     if found.ndim < 2 or any(n != 1 for n in found.shape[:-2]):
         raise ShapeError(
             f"{layout}: the output has shape {found.shape}; expected (1, rows, columns): another layout?"
@@ -164,7 +192,9 @@ def _at_least(rows: Floats, columns: int, layout: Layout) -> None:
     exactly = layout in ("final", "ssd")
     if rows.shape[1] < columns or (exactly and rows.shape[1] != columns):
         wanted = f"{columns}{'' if exactly else ' or more'}"
-        raise ShapeError(f"{layout}: rows have {rows.shape[1]} numbers; expected {wanted}: another layout?")
+        raise ShapeError(
+            f"{layout}: rows have {rows.shape[1]} numbers; expected {wanted}: another layout, or names?"
+        )
 
 
 def _from_corners(corners: Floats) -> Floats:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from onnx_worlds import colour_detector, colour_segmenter, constant, scene
+from onnx_worlds import colour_detector, colour_instances, colour_segmenter, constant, scene
 
 from factorlab.cli import main
 from factorlab.cli.objects import LAYOUTS
@@ -91,6 +91,19 @@ def test_a_map_of_classes_writes_its_files(picture, tmp_path):
     again = run(path, "--color", "red", "-o", tmp_path / "out")
     assert again.exit_code == 1
     assert "--force" in again.stderr
+
+
+def test_masks_of_objects(picture, tmp_path):
+    path, boxes = picture
+    model = colour_instances(tmp_path / "net.onnx", notes=NAMES)
+    done = run(path, "--onnx", model, "--overlap", "0.1", "--json", "-o", tmp_path / "out")
+    assert done.exit_code == 0, done.stderr
+    whole = json.loads(done.stdout)
+    assert all(one["area_px"] > 0 for one in whole["objects"])
+    mask = cv2.imread(str(tmp_path / "out" / "mask.png"), cv2.IMREAD_UNCHANGED)
+    for left, top, width, height in boxes.values():
+        assert mask[top + height // 2, left + width // 2] == 255
+    assert mask[5, 100] == 0
 
 
 def test_nothing_found_fails_only_with_check(picture):

@@ -3,9 +3,9 @@
 import cv2
 import numpy as np
 import pytest
-from onnx_worlds import SIZE, colour_detector, colour_segmenter, constant, grid, scene
+from onnx_worlds import SIZE, colour_detector, colour_instances, colour_segmenter, constant, grid, scene
 
-from sequential.errors import DataError, FileFormatError, NotFiniteError, ShapeError
+from sequential.errors import DataError, FileFormatError, ShapeError
 from vision3d.objects import (
     ObjectNetwork,
     Preparation,
@@ -264,10 +264,39 @@ def test_letterbox_takes_grey_and_opacity_and_says_no(rng):
         letterbox(np.zeros((5, 5)), (8, 8))
 
 
-def test_scores_that_are_not_finite_are_said():
-    from vision3d.objects.boxes import chosen
+@pytest.mark.parametrize("shape", [(64, 64), (120, 200), (200, 90)])
+def test_a_mask_for_every_box(tmp_path, shape):
+    network = ObjectNetwork(colour_instances(tmp_path / "net.onnx", notes=NAMES))
+    image, truth = np.full((*shape, 3), 20, np.uint8), np.zeros(shape, bool)
+    rows, columns = slice(shape[0] // 4, shape[0] // 2), slice(shape[1] // 4, shape[1] // 2)
+    image[rows, columns], truth[rows, columns] = (10, 10, 240), True
+    found = network.detect(image, least_score=0.3, most_overlap=0.1)
+    assert found.masks.shape == (len(found), *shape)
+    assert {found.name(k) for k in range(len(found))} == {"red"}
+    outside = found.masks & ~truth
+    assert outside.sum() < 0.3 * found.masks.sum(), "the mask follows the object, and not the box"
+    left, top, width, height = found.boxes[0]
+    y, x = np.nonzero(found.masks[0])
+    assert x.min() >= left - 0.5
+    assert x.max() <= left + width
+    assert y.min() >= top - 0.5
+    assert y.max() <= top + height
+    assert found.masks[0].sum() > 0.4 * truth.sum()
 
-    with pytest.raises(NotFiniteError):
-        chosen(
-            np.zeros((1, 4)), np.array([np.inf]), np.zeros(1, np.int64), (), least_score=0.1, most_overlap=0.5
-        )
+
+def test_masks_that_do_not_fit_are_said(tmp_path):
+    path = constant(tmp_path / "net.onnx", rows=np.full((1, 8, 50), 0.5), maps=np.zeros((1, 3, 8, 8)))
+    with pytest.raises(ShapeError, match="coefficients"):
+        ObjectNetwork(path, names=("one", "two")).detect(np.zeros((9, 9, 3), np.uint8))
+
+
+def test_a_model_of_key_points_is_told_apart(tmp_path, rng):
+    rows = np.vstack([np.full((4, 200), 20.0), np.full((1, 200), 0.9), rng.random((51, 200)) * 640])
+    path = constant(tmp_path / "net.onnx", rows=rows[None])
+    image = np.zeros((SIZE, SIZE, 3), np.uint8)
+    with pytest.raises(ShapeError, match="names of its classes"):
+        ObjectNetwork(path).detect(image)
+    found = ObjectNetwork(path, names=("person",)).detect(image)
+    assert len(found) == 1
+    assert found.scores[0] == pytest.approx(0.9)
+    assert found.masks is None
