@@ -1,9 +1,8 @@
 """Networks that the tests write: the file's outside, every family of outputs, and pictures end to end."""
 
-import cv2
 import numpy as np
 import pytest
-from onnx_worlds import SIZE, colour_detector, colour_instances, colour_segmenter, constant, grid, scene
+from onnx_worlds import NAMES, SIZE, colour_detector, colour_instances, colour_segmenter, constant, scene
 
 from sequential.errors import DataError, FileFormatError, ShapeError
 from vision3d.objects import (
@@ -13,11 +12,7 @@ from vision3d.objects import (
     class_scores,
     guess_layout,
     iou,
-    letterbox,
-    read_onnx,
 )
-
-NAMES = {"names": {0: "red", 1: "blue"}, "stride": 8}
 
 
 @pytest.mark.parametrize("rows_first", [False, True])
@@ -164,42 +159,6 @@ def test_a_layout_that_does_not_fit_is_said(layout, shape, words):
         candidates(outputs, layout, (SIZE, SIZE), 0.1)
 
 
-def test_the_file_s_outside(tmp_path):
-    import onnx
-
-    path = colour_detector(tmp_path / "net.onnx", notes=NAMES)
-    found = read_onnx(path)
-    theirs = onnx.load(str(path)).graph
-    assert list(found.inputs) == [one.name for one in theirs.input]
-    assert found.inputs["images"] == (1, 3, SIZE, SIZE)
-    assert found.outputs == {"output0": (1, 6, grid().shape[1])}
-    assert found.image_size == (SIZE, SIZE)
-    assert found.class_names == ("red", "blue")
-    assert found.notes["stride"] == "8"
-
-
-def test_open_dimensions_and_weights_among_inputs(tmp_path):
-    import onnx
-    from onnx import helper
-
-    path = colour_detector(tmp_path / "net.onnx")
-    model = onnx.load(str(path))
-    for axis, name in ((0, "batch"), (2, "height")):
-        model.graph.input[0].type.tensor_type.shape.dim[axis].dim_param = name
-    model.graph.input.append(helper.make_tensor_value_info("weights", 1, [2, 3, 1, 1]))
-    onnx.save(model, str(path))
-    found = read_onnx(path)
-    assert found.inputs == {"images": ("batch", 3, "height", SIZE)}
-    assert found.image_size is None
-    assert found.class_names == ()
-    for written, size in (("[320, 640]", (640, 320)), ("[0, 640]", None), ("rm -rf", None), ("640", None)):
-        del model.metadata_props[:]
-        note = model.metadata_props.add()
-        note.key, note.value = "imgsz", written
-        onnx.save(model, str(path))
-        assert read_onnx(path).image_size == size
-
-
 def test_what_is_no_network_is_said(tmp_path, rng):
     whole = colour_detector(tmp_path / "net.onnx").read_bytes()
     texts = {
@@ -236,32 +195,6 @@ def test_a_canvas_of_another_size_is_said(tmp_path):
     for wrong in ({"size": (0, 5)}, {"scale": 0.0}, {"deviation": (1.0, 0.0, 1.0)}):
         with pytest.raises(DataError):
             Preparation(**wrong)
-
-
-@pytest.mark.parametrize("shape", [(120, 200), (200, 120), (33, 33), (1, 400), (640, 640)])
-@pytest.mark.parametrize("keep_shape", [True, False])
-def test_letterbox_there_and_back(shape, keep_shape, rng):
-    image = rng.integers(0, 256, (*shape, 3), dtype=np.uint8)
-    canvas, placement = letterbox(image, (96, 64), keep_shape=keep_shape)
-    assert canvas.shape == (64, 96, 3)
-    low = rng.random((20, 2)) * np.array(shape[::-1]) * 0.6
-    boxes = np.column_stack([low, rng.random((20, 2)) * np.array(shape[::-1]) * 0.4])
-    np.testing.assert_allclose(placement.to_image(placement.to_canvas(boxes)), boxes, atol=1e-9)
-    rows, columns = placement.crop((96, 64))
-    plain = np.ones(canvas.shape[:2], bool)
-    plain[rows, columns] = False
-    assert np.all(canvas[plain] == 114)
-    whole = placement.to_image([[0, 0, 96, 64]])
-    np.testing.assert_allclose(whole, [[0, 0, shape[1], shape[0]]], atol=1e-9)
-
-
-def test_letterbox_takes_grey_and_opacity_and_says_no(rng):
-    grey = rng.integers(0, 256, (30, 40), dtype=np.uint8)
-    canvas, _ = letterbox(grey, (40, 30))
-    np.testing.assert_array_equal(canvas, cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR))
-    assert letterbox(np.zeros((5, 5, 4), np.uint8), (8, 8))[0].shape == (8, 8, 3)
-    with pytest.raises(ShapeError, match="uint8"):
-        letterbox(np.zeros((5, 5)), (8, 8))
 
 
 @pytest.mark.parametrize("shape", [(64, 64), (120, 200), (200, 90)])
