@@ -20,6 +20,7 @@ from measure.timing import cpu_seconds
 
 from vision3d import image as im
 from vision3d.image.borders import cv2_border
+from vision3d.images import read_image
 from vision3d.objects import non_maximum_suppression
 
 BORDERS = ("constant", "replicate", "reflect", "reflect101")
@@ -33,8 +34,7 @@ Picture = np.ndarray
 def photographs() -> list[Picture]:
     """Grey pictures: those of the data, or noise and hills of the same size."""
     folder = Path(os.environ.get("FACTORLAB_DATA", "")) / "vision" / "opencv"
-    found = [cv2.imread(str(folder / name), cv2.IMREAD_GRAYSCALE) for name in PHOTOGRAPHS]
-    found = [one for one in found if one is not None]
+    found = [read_image(folder / name) for name in PHOTOGRAPHS if (folder / name).is_file()]
     if found:
         return found
     say("no photographs: FACTORLAB_DATA is not set; noise and hills instead")

@@ -73,7 +73,7 @@ def gaussian_blur(
         done = cv2.GaussianBlur(pixels, (size, size), sigma, borderType=cv2_border(border))
         return np.asarray(done).reshape(pixels.shape)
     if pixels.dtype == np.uint8:
-        return _bytes(pixels, fixed_point(taps), border, backend)
+        return _bytes(pixels, fixed_point(taps).astype(np.uint16), border, backend)
     if pixels.dtype == np.uint16:  # integers below 2⁵³ are exact in float64
         wide = _separable(
             pixels.astype(np.float64), fixed_point(taps, 16).astype(np.float64), border, backend
@@ -101,16 +101,16 @@ def _separable(pixels: Image, along: Image, border: Border, backend: Backend) ->
     return per_channel(pixels, one)
 
 
-def fixed_point(taps: NDArray[np.float64], bits: int = 8) -> NDArray[np.uint16]:
+def fixed_point(taps: NDArray[np.float64], bits: int = 8) -> NDArray[np.int64]:
     """Taps in 1/2^bits that still sum to one: what one was rounded by, the next makes good."""
     half = len(taps) // 2
-    out = np.zeros(len(taps), np.uint16)
+    out = np.zeros(len(taps), np.int64)
     left = 0.0
     for k in range(half):
         wanted = taps[k] * 2.0**bits + left
         out[k] = out[-1 - k] = round(wanted)
         left = wanted - round(wanted)
-    out[half] = min(2**bits - 2 * int(out[:half].sum()), 2**16 - 1)
+    out[half] = 2**bits - 2 * int(out[:half].sum())
     return out
 
 
