@@ -129,13 +129,18 @@ class Chromium:
         return answer["result"].get("value")
 
     def until(self, script, seconds=45):
-        """Wait until a script gives something that is true, and give it."""
-        end = time.monotonic() + seconds
+        """Wait until a script gives something that is true, and give it; it may fail while a page loads."""
+        end, fault = time.monotonic() + seconds, ""
         while time.monotonic() < end:
-            if value := self.run(script):
-                return value
+            try:
+                if value := self.run(script):
+                    return value
+            except RuntimeError as error:
+                fault = f" ({error})"
             time.sleep(0.05)
-        raise AssertionError(f"{script} stayed false for {seconds} s; the page says: {self.text()[:800]}")
+        raise AssertionError(
+            f"{script} stayed false for {seconds} s{fault}; the page says: {self.text()[:800]}"
+        )
 
     def text(self):
         """What a reader sees."""

@@ -62,6 +62,7 @@ class PageServer(ThreadingHTTPServer):
 
     def __init__(self, session: CameraSession, port: int) -> None:
         self.session, self.leaving = session, threading.Event()
+        self.talking: set[threading.Thread] = set()  # those that tell a page what goes on
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as fault:
@@ -77,6 +78,8 @@ class PageServer(ThreadingHTTPServer):
     def close(self) -> None:
         """Stop serving; pages say that the session is over."""
         self.leaving.set()
+        for thread in tuple(self.talking):
+            thread.join(timeout=1.0)
         self.shutdown()
         self.server_close()
         self._thread.join()
@@ -198,6 +201,13 @@ class _Handler(BaseHTTPRequestHandler):
                     self.wfile.write(head.encode() + shown.jpeg + b"\r\n")
 
     def _events(self) -> None:
+        self.server.talking.add(threading.current_thread())
+        try:
+            self._tell()
+        finally:
+            self.server.talking.discard(threading.current_thread())
+
+    def _tell(self) -> None:
         self._open("text/event-stream")
         session, after = self.server.session, 0
         while not self.server.leaving.is_set():

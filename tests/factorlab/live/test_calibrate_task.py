@@ -118,10 +118,14 @@ def test_views_are_dropped_and_forgotten(task, held):
     assert len(list(before.glob("pictures/*.png"))) == 5  # what was captured stays
 
 
-def test_a_report_is_written_and_offered(task, held):
+def test_a_report_is_written_and_offered_and_the_other_tasks_know_the_camera(held, tmp_path):
+    settings = TaskSettings(board=BOARD, lens="brown4", folder=tmp_path, height_m=0.2, pitch_deg=40.0)
+    tasks = {one.name: one.make() for one in task_choices(settings)}
+    task = tasks["calibrate"]
+    assert tasks["markers"].actions == ()
     hold(task, held[1])
     task.act("finish")
-    wait_for(lambda: task.desk.now.saved, 60)
+    task.close()  # which waits for what was asked for
     saved = task.desk.now.saved
     report = json.loads((saved.folder / "report" / "report.json").read_text(encoding="utf-8"))
     assert {"report.html", "report.json", "corners.csv"} <= set(report["files"])
@@ -132,6 +136,10 @@ def test_a_report_is_written_and_offered(task, held):
     assert task.file("../report.json") is None
     assert reading.tables[0].title == "The report's verdicts"
     assert task.summary()["saved"] == str(saved.folder)
+    for name in ("markers", "line"):
+        tasks[name].restart()  # as a session does where it is chosen
+    assert dict(tasks["markers"].actions).keys() == {"forget"}
+    assert tasks["line"]._ground.camera.lens == "brown4"
 
 
 def test_what_cannot_be_done_is_a_sentence(task, held):
@@ -208,22 +216,6 @@ def test_other_boards_are_taken_as_well(board, tmp_path, rng):
         assert standing.calibration.camera.intrinsics[:2] == pytest.approx(CAMERA.intrinsics[:2], rel=0.03)
     finally:
         task.close()
-
-
-def test_the_other_tasks_know_the_camera_that_was_saved(held, tmp_path):
-    settings = TaskSettings(board=BOARD, lens="brown2", folder=tmp_path, height_m=0.2, pitch_deg=40.0)
-    tasks = {one.name: one.make() for one in task_choices(settings)}
-    try:
-        assert tasks["markers"].actions == ()
-        hold(tasks["calibrate"], held[1])
-        tasks["calibrate"].act("finish")
-        wait_for(lambda: tasks["calibrate"].desk.now.saved)
-        for name in ("markers", "line"):
-            tasks[name].restart()  # as a session does where it is chosen
-        assert dict(tasks["markers"].actions).keys() == {"forget"}
-        assert tasks["line"]._ground.camera.lens == "brown2"
-    finally:
-        tasks["calibrate"].close()
 
 
 def test_photographs_of_a_folder_are_views_at_once(live, data_dir, tmp_path):

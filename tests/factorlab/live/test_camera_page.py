@@ -1,5 +1,11 @@
 """The page in a browser: the picture moves, numbers arrive, buttons work, the console is silent."""
 
+import contextlib
+import re
+import signal
+import subprocess
+import sys
+
 import pytest
 
 PIXELS = """(() => {
@@ -56,6 +62,7 @@ def test_the_page_says_when_the_session_is_over(window, live, marker_video):
     session.close()
     server.close()
     window.until("fault.textContent.startsWith('factorlab live has ended')")
+    window.console.clear()  # where the browser says that nobody answers any more
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -70,3 +77,32 @@ def test_the_page_paints_in_both_themes(window, live, marker_video, tmp_path, sc
     assert (sum(ground) < 150) == (scheme == "dark")
     window.screenshot(tmp_path / "page.png")
     assert (tmp_path / "page.png").stat().st_size > 20_000
+
+
+@contextlib.contextmanager
+def command(source, port):
+    """`factorlab live camera` in a process of its own, and the port of its page; ends as by Ctrl-C."""
+    options = ("--loop", "--no-browser", "--port", str(port))
+    with subprocess.Popen(
+        [sys.executable, "-m", "factorlab", "live", "camera", str(source), *options],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield int(re.search(r":(\d+)/", process.stderr.readline())[1])
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(30)
+    assert process.returncode == 0
+
+
+def test_the_page_hears_the_end_of_the_command_and_its_next_start(window, marker_video):
+    with command(marker_video, 0) as port:
+        window.visit(f"http://127.0.0.1:{port}/")
+        window.until("document.body.dataset.frame > 2")
+    window.until("fault.textContent.startsWith('factorlab live has ended')")
+    with command(marker_video, port):
+        window.until("fault.hidden && picture.naturalWidth === 320 && document.body.dataset.frame > 2")
+        window.visit("about:blank")
+    window.console.clear()  # where the browser says that nobody answered meanwhile

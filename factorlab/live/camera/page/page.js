@@ -30,9 +30,15 @@ async function send(wish) {
 
 function leave() {
   over = true;
-  at("fault").textContent = "factorlab live has ended; start it again and reload this page.";
+  at("fault").textContent = "factorlab live has ended. Start it again: this page comes back by itself.";
   at("fault").hidden = false;
   for (const button of document.querySelectorAll("button:not(#theme)")) button.disabled = true;
+}
+
+// The browser asks again and again after the server is gone; its first answer is a new session.
+function hear(event) {
+  if (over) location.reload();
+  else show(JSON.parse(event.data));
 }
 
 function show(next) {
@@ -146,7 +152,7 @@ theme(kept ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "li
 addEventListener("load", () => {
   at("picture").src = "/stream.mjpg"; // after the page is complete: a stream never is
   const events = new EventSource("/events");
-  events.addEventListener("message", (event) => show(JSON.parse(event.data)));
-  events.addEventListener("over", () => { events.close(); leave(); });
-  events.addEventListener("error", () => { if (events.readyState === EventSource.CLOSED) leave(); });
+  events.addEventListener("message", hear);
+  events.addEventListener("over", leave);
+  events.addEventListener("error", leave);
 });
