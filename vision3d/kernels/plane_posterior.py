@@ -1,9 +1,10 @@
 """The pose of a flat object as two modes with their weights, by integration over its tilt.
 
 The two minima of `plane_minima` are compared by the probability around each, not by their residuals: the
-density of the tilt (the other four coordinates are integrated out by Laplace's method) is summed over a grid
-that covers both basins, which are parted where the line between the minima is lowest.  Where a minimum is
-sharp and far from the other, Laplace's method alone does the same for less.
+density of the tilt (the other four coordinates are integrated out by Laplace's method) is summed over a
+grid that covers both basins, which are parted where the line between the minima is lowest: sharply where
+the valley is deep, softly where there is hardly one (0.3 of the way between them, by the odds of the
+valley). Where a minimum is sharp and far from the other, Laplace's method alone does the same for less.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from vision3d.kernels.tilt_chart import log_density, moments, sight_frame, tilt_
 __all__ = ["posterior"]
 
 DROP = 9.0  # nats below the top at which a density is over: 4.2 sigma
-SHARP = 60.0  # a valley this deep parts minima that are Gaussian: 22 sigma
+SHARP = 250.0  # a valley this deep parts minima that are Gaussian: 45 sigma
 NARROW = 0.02  # rad: a lone minimum sharper than this is Gaussian
 WIDEST = 3.0  # rad
 ALONG, ACROSS, ALONE = 21, 13, 11  # nodes of a grid over both minima, and over one
@@ -103,20 +104,23 @@ def grid(V, origin, u, box, along, across, R0, t0, X, n, A, W, rows, logs, place
 
 
 @kernel(
-    "f8(i8, f8[::1], f8[::1], f8, f8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[::1], "
+    "f8(i8, f8[::1], f8[::1], i8, f8, f8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[::1], "
     "f8[:,::1], f8[::1])"
 )
-def summed(count, logs, places, low, high, weights, Rs, ts, Cs, R, t, cov, mean):
-    """Sum the nodes with low <= place < high into log Z, and move (R, t) to their mean, cov about it."""
+def summed(count, logs, places, side, cut, width, weights, Rs, ts, Cs, R, t, cov, mean):
+    """Sum the nodes into log Z, and move (R, t) to their mean, cov about it.
+
+    A node belongs to both minima: `side` 1 is the one before the cut, -1 the one behind, 0 takes all.
+    """
     top = -math.inf
     for k in range(count):
-        if low <= places[k] < high:
-            top = max(top, logs[k])
+        top = max(top, logs[k])
     if not top > -math.inf:
         return -math.inf
     total = 0.0
     for k in range(count):
-        weights[k] = math.exp(logs[k] - top) if low <= places[k] < high else 0.0
+        belongs = 1.0 if side == 0 else 1.0 / (1.0 + math.exp(min(side * (places[k] - cut) / width, 500.0)))
+        weights[k] = belongs * math.exp(logs[k] - top)
         total += weights[k]
     for k in range(count):
         weights[k] /= total
@@ -168,15 +172,18 @@ def integrate(V, tilt, f, count, separation, cut, floor, R, t, X, n, A, W, rows,
             V, tilt[0], u, box, ALONG, ACROSS, R[0], t[0], X, n, A, W, rows, logs, places, Rs, ts, Cs
         )  # fmt: skip
     for m in range(count):
-        low, high = -math.inf, math.inf
+        side = 0
+        width = 0.3 * separation * math.exp(min(floor - min(f[0], f[1]), 0.0)) + 1e-9 if count == 2 else 1.0
         if joined:
-            low, high = (low, cut) if m == 0 else (cut, high)
+            side = 1 if m == 0 else -1
         else:
             box[0], box[1], box[2], box[3] = -reaches[m, 0], reaches[m, 1], -reaches[m, 2], reaches[m, 3]
             nodes = grid(
                 V, tilt[m], u, box, ALONE, ALONE, R[m], t[m], X, n, A, W, rows, logs, places, Rs, ts, Cs
             )  # fmt: skip
-        log_z[m] = summed(nodes, logs, places, low, high, weights, Rs, ts, Cs, R[m], t[m], cov[m], mean)
+        log_z[m] = summed(
+            nodes, logs, places, side, cut, width, weights, Rs, ts, Cs, R[m], t[m], cov[m], mean
+        )
 
 
 @kernel(
