@@ -10,6 +10,8 @@ from factorlab.live.camera.tasks.markers import PATIENCE, MarkersTask
 from sequential.errors import DataError
 from sequential.manifold import SE3
 from vision3d.frames import Frame
+from vision3d.markers import Marker, MarkerPose, Mode, TrackedMarker, marker_corners
+from vision3d.pose import project_object
 
 
 def frame(k, image):
@@ -103,15 +105,20 @@ def test_the_dictionary_is_found_out_frame_by_frame(images):
     assert task.summary()["dictionary"] == "auto"
 
 
-def test_an_open_pose_says_what_to_do(rng):
-    """A small marker that nearly faces the camera: one picture cannot tell its tilt."""
-    from vision3d.render import Plane, marker_texture, render_planes
-
-    turn = SE3().retract(SE3().identity(), np.array([0.12, 0.0, 0, 0, 0, 0]))
-    plane = Plane(np.array([*turn[:4], 0.02, 0.01, 1.1]), marker_texture("4x4_50", 3, MARKER_M))
-    image = render_planes(CAMERA, [plane], rng=rng, noise=3.0)
-    reading = MarkersTask(KnownCamera(CAMERA), MARKER_M, "4x4_50").read(frame(0, image))
+def test_an_open_pose_says_what_to_do(task):
+    """Two readings, three to two: amber, with the other pose in the table."""
+    poses = [np.array([np.cos(a), np.sin(a), 0.0, 0.0, 0.02, 0.01, 1.1]) for a in (0.1, -0.1)]
+    cov = np.diag([1e-2, 1e-2, 1e-4, 1e-8, 1e-8, 4e-6])
+    modes = tuple(Mode(pose, cov, share, 0.1, pose) for pose, share in zip(poses, (0.6, 0.4), strict=True))
+    corners = project_object(CAMERA, poses[0], marker_corners(MARKER_M))
+    marker = Marker(3, corners, np.full(4, 0.2))
+    both = MarkerPose(modes)
+    reading = task._placed((TrackedMarker(3, both, seen=True, since_s=0.0, measured=both, marker=marker,
+                                          velocity=np.zeros(6)),))  # fmt: skip
     assert (reading.headline, reading.state) == ("1 marker, 1 with two poses", "warn")
-    assert reading.notes[0].startswith("3: two poses fit, odds ")
-    assert reading.rows[0]["odds"] < 20
-    assert reading.rows[0]["other_z_m"] == pytest.approx(1.1, rel=0.05)
+    assert reading.notes == ("3: two poses fit, odds 2 : 1; tilt it, or come nearer",)
+    assert {mark.role for mark in reading.marks} == {"warn", "x", "y", "z"}
+    row = reading.rows[0]
+    assert row["odds"] == pytest.approx(1.5)
+    assert row["sigma_z_m"] == pytest.approx(2e-3, rel=0.05)
+    assert (row["other_qx"], row["other_z_m"]) == pytest.approx((-np.sin(0.1), 1.1))
