@@ -241,6 +241,7 @@ def _others(done: CalibratedCamera) -> list[Verdict]:
         meaning = f"{fit.views[view].name} fits {ratio:.1f} times worse than the others and counts less"
         action = "look at its corners, or leave it out"
         found.append(Verdict("picture that does not fit", None, None, "WARN", meaning, action))
+    found += [Verdict("what σ holds", None, None, "INFO", text) for text in fit.report.remarks]
     return found
 
 

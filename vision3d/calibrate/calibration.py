@@ -34,6 +34,8 @@ class SolveReport:
         The parameters that make up that combination.
     findings : tuple[str, ...]
         What a careful user should know: a fold inside the image, views that do not fit, weak parameters.
+    remarks : tuple[str, ...]
+        Those of them that tell what the standard deviations have in them.
     """
 
     message: str
@@ -42,6 +44,7 @@ class SolveReport:
     condition: float
     weakest: str
     findings: tuple[str, ...]
+    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)

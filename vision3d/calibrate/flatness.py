@@ -47,4 +47,6 @@ def with_flatness(found: Calibration) -> Calibration:
         f"stands {rise:.2f} ± {spread:.2f} mm off the ends; glue it to a rigid plate "
         "(in Python, calibrate(…, board_warp=True) takes the bend into account)"
     )
-    return replace(found, report=replace(found.report, findings=(*found.report.findings, words)))
+    told = found.report
+    told = replace(told, findings=(*told.findings, words), remarks=(*told.remarks, words))
+    return replace(found, report=told)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from sequential.errors import UnderConstrainedError
 from sequential.manifold.quaternion import rotation_matrix
 from vision3d.calibrate.calibration import Calibration, SolveReport
-from vision3d.calibrate.covariance import Covariances, covariances
+from vision3d.calibrate.covariance import covariances
+from vision3d.calibrate.findings import findings_of, remarks_of
 from vision3d.calibrate.look_alikes import groups_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.robust import Trusted
@@ -22,10 +23,6 @@ Mask = NDArray[np.bool_]
 
 FREE_FOCAL = 0.25
 """Relative standard deviation of a focal length from which the views are said to leave it free."""
-WEAK_FOCAL = 0.01
-ILL = 1e8
-DISTINCT = 0.8
-"""Views that show the board in fewer places than this share of them are remarked upon."""
 
 
 def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free: Mask) -> Calibration:
@@ -55,7 +52,8 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     numbers = np.concatenate([view.ids for view in views])
     left_out = tuple((int(owner[i]), int(numbers[i])) for i in np.flatnonzero(~used))
     rms = float(np.sqrt(np.mean(squares[relative == 1.0])))
-    findings = _findings(views, problem, camera, trusted, left_out, view_rms, known, groups)
+    remarks = remarks_of(known, groups)
+    findings = (*findings_of(views, problem, camera, trusted, left_out, known), *remarks)
     message = (
         f"{camera.lens}: {len(views)} views, {int(used.sum())} of {len(used)} corners, RMS {rms:.3f} px, "
         f"{'settled' if solution.converged else 'not settled'} after {trusted.iterations} steps"
@@ -67,6 +65,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
         known.condition,
         _names(known.weakest, camera),
         findings,
+        remarks,
     )
     return Calibration(
         camera=camera,
@@ -108,69 +107,8 @@ def _missing(problem: Problem, poses: Array, focal: float) -> str:
     )
 
 
-def _findings(
-    views: tuple[View, ...],
-    problem: Problem,
-    camera: Camera,
-    trusted: Trusted,
-    left_out: tuple[tuple[int, int], ...],
-    view_rms: Array,
-    known: Covariances,
-    groups: NDArray[np.int64],
-) -> tuple[str, ...]:
-    """Sentences about what a user should know."""
-    found: list[str] = []
-    if not trusted.solution.converged:
-        found.append("the solve had not settled when it ended: the result may be away from the best fit")
-    for v in trusted.outlier_views:
-        weight = trusted.weights[problem.starts[v] : problem.starts[v + 1]].max()
-        found.append(
-            f"{views[v].name} fits {weight**-0.5:.1f}x worse than the others for what its corners state (RMS "
-            f"{view_rms[v]:.2f} px) and counts accordingly less; look at its corners, or leave it out"
-        )
-    for v in sorted({one for one, _ in left_out}):
-        corners = ", ".join(str(corner) for one, corner in left_out if one == v)
-        found.append(f"{views[v].name}: left out corner {corners}, further off than noise explains")
-    found.extend(
-        f"{views[v].name} shows the board from behind: its corners are numbered in mirror image, as when "
-        "the picture was flipped"
-        for v in _from_behind(trusted.solution.unknowns.poses, views)
-    )
-    std = np.sqrt(np.diag(known.joint))
-    distinct = int(groups.max()) + 1
-    if distinct < DISTINCT * len(views):
-        found.append(
-            f"{len(views)} views show the board in only {distinct} places: those alike count as one where "
-            "views are compared; move the board more between views"
-        )
-    if known.inflation > 1.0:
-        found.append(
-            "the corners of one view err together (a board that is not quite flat, a lens that is not quite "
-            f"the model): standard deviations are {known.inflation:.1f}x those of independent corners"
-        )
-    if (std[:2] > WEAK_FOCAL * camera.parameters[:2]).any():
-        share = 100.0 * float((std[:2] / camera.parameters[:2]).max())
-        found.append(
-            f"the views hardly determine the focal length (standard deviation {share:.1f} %): add tilted ones"
-        )
-    if known.condition > ILL:
-        found.append(
-            f"some parameters can trade places with each other (condition {known.condition:.0e}): read the "
-            "uncertainty of projections, not of single coefficients, or take a lens with fewer coefficients"
-        )
-    if (fold := camera.check_monotonic()).inside:
-        found.append(str(fold))
-    return tuple(found)
-
-
 def _names(weakest: Array, camera: Camera) -> str:
     """Parameters that take part in a direction."""
     share = np.abs(weakest)
     names = (*camera.names, "warp x", "warp y")
     return ", ".join(name for name, part in zip(names, share, strict=True) if part > 0.5 * share.max())
-
-
-def _from_behind(poses: Array, views: tuple[View, ...]) -> list[int]:
-    """Views of a flat board whose z axis points towards the camera."""
-    away = np.einsum("vi,vi->v", rotation_matrix(poses[:, :4])[:, :, 2], poses[:, 4:]) > 0.0
-    return [v for v, view in enumerate(views) if not away[v] and not np.ptp(view.points[:, 2]) > 0.0]
