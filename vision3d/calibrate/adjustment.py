@@ -9,13 +9,14 @@ the damping is Nielsen's (1999, "Damping parameter in Marquardt's method").
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sequential.manifold import SE3
 from vision3d.calibrate.problem import Problem
-from vision3d.camera import LENS_CODE
+from vision3d.lenses import LENS_CODE, LENSES
 
 __all__ = ["Blocks", "Solution", "Unknowns", "adjust", "linearize", "schur"]
 
@@ -27,6 +28,10 @@ SETTLED = 1e-10
 SHARP_PX = 1e-8
 """… or when it promises to move the corners by less than this, root of the mean square."""
 ITERATIONS = 100
+PRIOR_STD = {"rational8": 3.0, "thin12": 3.0}
+"""Deviation from zero of the radial coefficients of lenses that divide two polynomials.  Top and bottom trade
+places: without a bound they run off together to hundreds, and put a pole among the corners."""
+RADIAL = frozenset({"k1", "k2", "k3", "k4", "k5", "k6"})
 FAR_PX = 1e4
 """Taken for the distance of a corner that has no projection, such as one behind the camera."""
 
@@ -43,7 +48,10 @@ class Unknowns:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Residuals (M, 2) and the arrow's blocks per view, named as in `vision3d.kernels.adjustment`."""
+    """Residuals (M, 2) and the arrow's blocks per view, named as in `vision3d.kernels.adjustment`.
+
+    `prior` (q,) is the information of the bound on the coefficients, `pull` (q,) its score.
+    """
 
     residuals: Array
     U: Array
@@ -52,11 +60,20 @@ class Blocks:
     a: Array
     b: Array
     lost: int
+    prior: Array
+    pull: Array
 
     def cost(self, weights: Array) -> float:
         """Half the weighted sum of squares; a corner without a projection counts as `FAR_PX` off."""
-        squares = np.where(np.isnan(self.residuals), FAR_PX**2, self.residuals**2) if self.lost else None
-        return 0.5 * float(np.sum(weights[:, None] * (self.residuals**2 if squares is None else squares)))
+        squares = self.residuals**2
+        if self.lost:
+            squares = np.where(np.isnan(squares), FAR_PX**2, squares)
+        return 0.5 * float(np.sum(weights[:, None] * squares))
+
+    def objective(self, weights: Array) -> float:
+        """The cost, and what the bound on the coefficients adds to it."""
+        held = self.prior > 0.0
+        return self.cost(weights) + 0.5 * float(np.sum(self.pull[held] ** 2 / self.prior[held]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +107,19 @@ def linearize(problem: Problem, unknowns: Unknowns, weights: Array) -> Blocks:
         weights,
         *(residuals, U, W, T, a, b),
     )
-    return Blocks(residuals, U, W, T, a, b, lost)
+    prior = _prior(unknowns.lens) * problem.scale**2
+    pull = -prior * np.concatenate([unknowns.parameters, unknowns.warp])
+    return Blocks(residuals, U, W, T, a, b, lost, prior, pull)
+
+
+@cache
+def _prior(lens: str) -> Array:
+    """Information (q,) of the bound on the coefficients of a lens; zero for most."""
+    names = (*LENSES[lens].parameters, "warp x", "warp y")
+    bounded = np.array([name in RADIAL for name in names])
+    prior = bounded / PRIOR_STD[lens] ** 2 if lens in PRIOR_STD else np.zeros(len(names))
+    prior.flags.writeable = False
+    return prior
 
 
 def schur(blocks: Blocks, free: Mask, damping: float = 0.0) -> tuple[Array, Array, Array, Array]:
@@ -107,7 +136,8 @@ def schur(blocks: Blocks, free: Mask, damping: float = 0.0) -> tuple[Array, Arra
     Y : Array
         -T⁻¹ W', (V, 6, f): how poses follow the parameters.
     """
-    U, a = blocks.U.sum(axis=0)[np.ix_(free, free)], blocks.a.sum(axis=0)[free]
+    U = (blocks.U.sum(axis=0) + np.diag(blocks.prior))[np.ix_(free, free)]
+    a = (blocks.a.sum(axis=0) + blocks.pull)[free]
     W, T = blocks.W[:, free], blocks.T
     if damping:
         U = U + damping * np.diag(np.diag(U))
@@ -156,7 +186,7 @@ def adjust(
         The best that was met; `converged` says whether the solve settled there.
     """
     blocks = linearize(problem, unknowns, weights)
-    cost, damping, growth = blocks.cost(weights), 1e-4, 2.0
+    cost, damping, growth = blocks.objective(weights), 1e-4, 2.0
     least = SHARP_PX**2 * float(weights.sum())
     for iteration in range(1, iterations + 1):
         step = _step(blocks, free, damping)
@@ -168,9 +198,9 @@ def adjust(
             return Solution(unknowns, blocks, cost, iteration, converged=True)
         moved = _moved(unknowns, camera_step, pose_steps)
         ahead = linearize(problem, moved, weights)
-        fall = cost - ahead.cost(weights)
+        fall = cost - ahead.objective(weights)
         if fall > 0.0:
-            unknowns, blocks, cost = moved, ahead, ahead.cost(weights)
+            unknowns, blocks, cost = moved, ahead, cost - fall
             damping *= max(1.0 / 10.0, 1.0 - (2.0 * min(fall / promised, 1.0) - 1.0) ** 3)
             growth = 2.0
         elif promised <= 1e-9 * cost and fall > -1e-12 * cost:
@@ -193,7 +223,7 @@ def _step(blocks: Blocks, free: Mask, damping: float) -> tuple[Array, Array, flo
     pose_steps = np.einsum("vij,vj->vi", T_inverse, blocks.b) + Y @ moved
     camera_step = np.zeros(len(free))
     camera_step[free] = moved
-    promised = 0.5 * float(blocks.a.sum(axis=0)[free] @ moved + np.sum(blocks.b * pose_steps))
+    promised = 0.5 * float((blocks.a.sum(axis=0) + blocks.pull)[free] @ moved + np.sum(blocks.b * pose_steps))
     if not np.isfinite(promised):
         return None
     return camera_step, pose_steps, promised

@@ -59,7 +59,7 @@ def leave_one_out(calibration: Calibration) -> LeaveOneOut:
     Corners that the calibration left out stay out, and views that it trusts less count as little here.
     Efron, Tibshirani 1993, "An introduction to the bootstrap", eq. 11.5, for the jackknife.
     """
-    problem = Problem.of(calibration.views, calibration.floor_px)
+    problem = Problem.of(calibration.views, calibration.floor_px, calibration.sigma_scale)
     weights = np.concatenate(calibration.weights)
     folds = folds_of(calibration.views)
     squares, parameters = held_out_squares(problem, calibration, weights, folds)

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError
 from sequential.manifold.quaternion import quaternion_from_matrix
-from vision3d.calibrate.adjustment import Solution, Unknowns, adjust
+from vision3d.calibrate.adjustment import PRIOR_STD, Solution, Unknowns, adjust
 from vision3d.calibrate.calibration import Calibration
 from vision3d.calibrate.flatness import with_flatness
 from vision3d.calibrate.noise import floor_of
 from vision3d.calibrate.problem import Problem
-from vision3d.calibrate.result import result_of
+from vision3d.calibrate.result import result_of, scale_of
 from vision3d.calibrate.robust import fit_robustly, weights_of, weights_of_views
 from vision3d.calibrate.start import begin, linear_pose
 from vision3d.camera import LENSES, Camera
@@ -84,8 +84,9 @@ def calibrate(
     free = np.ones(len(begun.unknowns.parameters) + 2, dtype=bool)
     free[-2:] = board_warp
     trusted = fit_robustly(problem, begun, free, robust=robust)
-    if floor_px := floor_of(trusted.solution.blocks.residuals, problem.sigma_px):
-        problem = Problem.of(views, floor_px)
+    floor_px = floor_of(trusted.solution.blocks.residuals, problem.sigma_px)
+    if floor_px > 0.0 or lens in PRIOR_STD:
+        problem = Problem.of(views, floor_px, scale_of(problem, trusted, free))
         trusted = fit_robustly(problem, trusted.solution, free, robust=robust)
     found = result_of(views, problem, trusted, free)
     return found if board_warp else with_flatness(found)

@@ -28,12 +28,12 @@ def with_flatness(found: Calibration) -> Calibration:
     """Add a finding where the corners of views err together and a bent board explains a part of it."""
     if found.inflation <= 1.0 or any(np.ptp(view.points[:, 2]) > 0.0 for view in found.views):
         return found
-    problem = Problem.of(found.views, found.floor_px)
+    problem = Problem.of(found.views, found.floor_px, found.sigma_scale)
     weights = weights_of(problem, np.concatenate(found.weights))
     begun = Unknowns(found.camera.lens, found.camera.parameters, found.warp, found.poses)
     solution = adjust(problem, begun, weights, np.ones(found.camera.count + 2, dtype=bool))
     flat = 0.5 * float(np.sum(weights[:, None] * np.concatenate(found.residuals) ** 2))
-    if solution.cost > WORTH * flat:
+    if solution.blocks.cost(weights) > WORTH * flat:
         return found
     free = np.ones(found.camera.count + 2, dtype=bool)
     known = covariances(solution.blocks, free, found.sigma_scale, groups_of(found.views))

@@ -122,7 +122,8 @@ def choose_lens(
     if not fits:
         raise next(iter(refused.values()))
     best_fit = min(fits.values(), key=_typical)
-    problem, weights = Problem.of(views, best_fit.floor_px), np.concatenate(best_fit.weights)
+    problem = Problem.of(views, best_fit.floor_px, best_fit.sigma_scale)
+    weights = np.concatenate(best_fit.weights)
     rows = []
     for lens in lenses:
         began = time.perf_counter()

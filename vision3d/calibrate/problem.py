@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ class Problem:
         Width and height of the images.
     floor_px : float
         What `sigma_px` has in it besides what the views state.
+    scale : float
+        Standard deviation of the residuals in units of `sigma_px`, as far as it is known: what is believed of
+        the coefficients of some lenses is weighed against residuals by it.
     """
 
     points: Array
@@ -43,9 +46,10 @@ class Problem:
     starts: NDArray[np.int64]
     size: tuple[int, int]
     floor_px: float = 0.0
+    scale: float = 1.0
 
     @classmethod
-    def of(cls, views: Sequence[View], floor_px: float = 0.0) -> Problem:
+    def of(cls, views: Sequence[View], floor_px: float = 0.0, scale: float = 1.0) -> Problem:
         """Lay out the corners of the views, a floor below their sigmas: see `vision3d.calibrate.noise`."""
         points = np.concatenate([np.asarray(view.points, np.float64) for view in views])
         counts = [len(view.points) for view in views]
@@ -57,6 +61,7 @@ class Problem:
             np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
             views[0].size,
             floor_px,
+            scale,
         )
 
     @classmethod
@@ -83,14 +88,13 @@ class Problem:
         rows = np.concatenate([np.arange(self.starts[v], self.starts[v + 1]) for v in chosen])
         counts = np.diff(self.starts)[np.asarray(chosen, np.int64)]
         starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        return Problem(
-            self.points[rows],
-            self.pixels[rows],
-            self.sigma_px[rows],
-            self.bend[rows],
-            starts,
-            self.size,
-            self.floor_px,
+        return replace(
+            self,
+            points=self.points[rows],
+            pixels=self.pixels[rows],
+            sigma_px=self.sigma_px[rows],
+            bend=self.bend[rows],
+            starts=starts,
         )
 
     def split(self, values: Array) -> tuple[Array, ...]:

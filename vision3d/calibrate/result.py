@@ -12,11 +12,11 @@ from vision3d.calibrate.covariance import covariances
 from vision3d.calibrate.findings import findings_of, remarks_of
 from vision3d.calibrate.look_alikes import groups_of
 from vision3d.calibrate.problem import Problem
-from vision3d.calibrate.robust import Trusted
+from vision3d.calibrate.robust import Trusted, weights_of
 from vision3d.camera import Camera
 from vision3d.views import View
 
-__all__ = ["result_of"]
+__all__ = ["result_of", "scale_of"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -36,8 +36,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     solution, unknowns = trusted.solution, trusted.solution.unknowns
     residuals, relative = solution.blocks.residuals, trusted.weights
     used = relative > 0.0
-    freedom = max(2 * int(used.sum()) - int(free.sum()) - 6 * problem.count, 1)
-    scale = float(np.sqrt(2.0 * solution.cost / freedom))
+    scale = scale_of(problem, trusted, free)
     groups = groups_of(views)
     known = covariances(solution.blocks, free, scale, groups)
     p, follows = len(unknowns.parameters), known.pose_follows
@@ -91,6 +90,13 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
         outlier_views=trusted.outlier_views,
         report=report,
     )
+
+
+def scale_of(problem: Problem, trusted: Trusted, free: Mask) -> float:
+    """Standard deviation of the residuals in units of sigma, judged by the freedom that is left."""
+    freedom = 2 * int(np.count_nonzero(trusted.weights)) - int(free.sum()) - 6 * problem.count
+    cost = trusted.solution.blocks.cost(weights_of(problem, trusted.weights))
+    return float(np.sqrt(2.0 * cost / max(freedom, 1)))
 
 
 def _missing(problem: Problem, poses: Array, focal: float) -> str:

@@ -25,7 +25,8 @@ def test_exact_corners_give_the_camera_back(lens):
     scene = world(lens, n=16, seed=1)
     found = calibrate(scene.views(np.random.default_rng(0), sigma_px=0.0, stated_px=0.1), lens)
     assert found.report.converged
-    assert found.rms_px < 1e-6
+    # the bound on the coefficients of a rational lens is not exact
+    assert found.rms_px < (1e-4 if lens in {"rational8", "thin12"} else 1e-6)
     probe = np.stack(np.meshgrid(np.linspace(60, 580, 9), np.linspace(60, 420, 7)), axis=-1).reshape(-1, 2)
     # coefficients of the rational lens trade places, projections do not
     np.testing.assert_allclose(found.camera.project(scene.camera.unproject(probe)), probe, atol=1e-3)
@@ -91,6 +92,20 @@ def dense_jacobian(found):
     jacobian = np.stack(columns, axis=-1)
     jacobian[:, : found.camera.count] /= scale
     return jacobian
+
+
+@pytest.mark.parametrize("lens", ["rational8", "thin12"])
+def test_the_bound_on_rational_coefficients_costs_no_honesty_and_keeps_poles_out(lens):
+    z, folded, largest = [], 0, []
+    for seed in range(6):
+        scene = world(lens, n=10, seed=70 + seed)
+        found = calibrate(scene.views(np.random.default_rng(seed)), lens)
+        z.append((found.camera.parameters - scene.camera.parameters) / found.std)
+        largest.append(np.abs(found.camera.distortion).max())
+        folded += np.isnan(found.camera.project(scene.camera.unproject(scene.exact.reshape(-1, 2)))).any()
+    assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.3
+    assert max(largest) < 15.0
+    assert not folded
 
 
 def test_wrong_corners_are_named_and_do_no_harm(rng):
