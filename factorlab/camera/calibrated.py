@@ -141,8 +141,8 @@ class CalibratedCamera:
     @cached_property
     def sigmas(self) -> tuple[Array, ...]:
         """Standard deviation of every corner of every view, px, as the residuals show it."""
-        scale = self.calibration.sigma_scale
-        return tuple(scale * view.sigma_px for view in self.calibration.views)
+        fit = self.calibration
+        return tuple(fit.sigma_scale * np.hypot(view.sigma_px, fit.floor_px) for view in fit.views)
 
     @cached_property
     def normals(self) -> Array:

@@ -38,7 +38,7 @@ def corners_csv(done: CalibratedCamera) -> str:
     for k, view in enumerate(fit.views):
         table = np.column_stack([view.pixels, done.sigmas[k], fit.residuals[k]])
         for row, corner, used, point in zip(table, view.ids, done.used[k], view.points, strict=True):
-            own = [f"{value:.7g}" for value in row]
+            own = [f"{value:.8g}" for value in row]
             out.writerow([view.name, corner, *own, int(used), *(f"{value:.9g}" for value in point)])
     return text.getvalue()
 
