@@ -1,6 +1,6 @@
 """Detection of boards beside OpenCV's, on rendered images whose corners are known, and on the real ones.
 
-`python detection.py [--json] [--quick]`; --quick takes a quarter of the images.  Needs FACTORLAB_DATA.  Errors
+`python detection.py [--json] [--quick]`; --quick takes a quarter of the images; needs FACTORLAB_DATA.  Errors
 are RMS of a coordinate; z is error / stated σ.  Ends with exit code 3 when a must is missed.
 """
 

@@ -23,12 +23,16 @@ Grey = NDArray[np.uint8]
 AREA_PX = 20.0
 ROUND = 0.12
 """How far the area of a blob may be from that of the ellipse with its moments."""
-FLAT = 6.0
+FLAT, CORNERED = 6.0, 5.2
+"""Longest to shortest axis at most; and the largest squared distance from the middle, in standard deviations:
+4 for an ellipse, 6 for a parallelogram."""
 MOST, THIN = 0.05, 0.25
 """Share of the image that a circle takes at most, and share of its upright box at least."""
 ALIKE = 2.5
 """Ratio of the areas of neighbours."""
 SEEDS, SMALLEST = 6, 6
+NEARLY_ALL = 0.95
+"""Share of its points that a lattice keeps when it is laid out as it is: sheared, it loses its ends."""
 BLOCKS = (6, 12)
 """Widths of the windows of the adaptive thresholds, as parts of the image."""
 LEAST = 0.5
@@ -114,7 +118,12 @@ def _round_blobs(mask: Grey) -> Blobs:
     det = np.maximum(xx * yy - xy * xy, 1e-12)
     flat = (0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)) ** 2 / det
     full = np.abs(area / (4.0 * np.pi * np.sqrt(det)) - 1.0) < ROUND
-    good = full & (flat < FLAT**2)
+    u, v = x - mx[label], y - my[label]
+    reach = np.zeros(count)
+    np.maximum.at(
+        reach, label, (yy[label] * u * u - 2.0 * xy[label] * u * v + xx[label] * v * v) / det[label]
+    )
+    good = full & (flat < FLAT**2) & (reach < CORNERED)
     return Blobs(np.stack([mx, my], axis=1)[good], area[good])
 
 
@@ -155,21 +164,24 @@ def _numbered(
     centres: Array, cells: dict[Cell, int], board: CircleGrid, image_size: tuple[int, int]
 ) -> Lattice:
     """Every way in which the lattice is the board seen from its front, and its size."""
-    places, at = np.array(list(cells)), centres[list(cells.values())]
-    x, y = (at - at.mean(axis=0)).T @ (places - places.mean(axis=0))
+    lattice, at = np.array(list(cells)), centres[list(cells.values())]
+    x, y = (at - at.mean(axis=0)).T @ (lattice - lattice.mean(axis=0))
     if x[0] * y[1] - x[1] * y[0] < 0.0:
-        places = places[:, ::-1]
+        lattice = lattice[:, ::-1]
     ways: dict[bytes, Cells] = {}
-    size, count = (0, 0), 0
+    size, best = (0, 0), 0.0
     for change in CHANGES:
-        laid = places @ change.T
+        laid = lattice @ change.T
         if board.asymmetric:
             laid = np.stack([laid[:, 0] - laid[:, 1], laid.sum(axis=1)], axis=1)
         way, shape, kept = _on_board(laid, at, board)
         if way is not None:
             ways[way.ids.tobytes()] = way
-        elif kept.sum() > count and believable(laid[kept], at[kept], shape[0] * shape[1], image_size):
-            size, count = shape, int(kept.sum())
+            continue
+        places = shape[0] * shape[1]
+        full = float(kept.sum()) ** 2 / places if kept.sum() >= NEARLY_ALL * len(kept) else 0.0
+        if full > best and believable(laid[kept], at[kept], places, image_size):
+            size, best = shape, full
     # a sheared lattice may fit as well, without its rim
     most = max((len(way.cells) for way in ways.values()), default=0)
     return Lattice(tuple(way for way in ways.values() if len(way.cells) == most), size)

@@ -6,7 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import ModelError, ShapeError
 from vision3d.boards import Board, CharucoBoard, Checkerboard, CircleGrid, MarkerBoard
+from vision3d.calibrate.detection.another import another_kind
 from vision3d.calibrate.detection.audit import audited
 from vision3d.calibrate.detection.charuco import find_charuco, find_marker_board
 from vision3d.calibrate.detection.checkerboards import find_checkerboard
@@ -60,15 +61,21 @@ def detect_views(
     if window is not None and isinstance(board, CircleGrid):
         raise ModelError("a window is for corners, and circles have none: leave --window out")
     outcomes: list[Outcome] = []
-    for name, outcome in _each(images, board, window, workers or os.cpu_count() or 1):
+    coming = iter(images)
+    first = list(islice(coming, 1))
+    for name, outcome in _each(chain(first, coming), board, window, workers or os.cpu_count() or 1):
         outcomes.append(outcome)
         if progress is not None:
             progress(len(outcomes), name)
     missed = tuple(one for one in outcomes if isinstance(one, Missed))
     seen = [one for one in outcomes if not isinstance(one, Missed)]
+    findings = _findings(board, seen, missed, window)
+    if first and not seen and not findings:
+        name, image = first[0]
+        another = another_kind(grey_of(image, name), board)
+        findings = (f"{name} shows {another}",) if another else ()
     return Detections(
-        tuple(view for view, _, _ in seen), missed, tuple(audit for _, audit, _ in seen),
-        _findings(board, seen, missed, window),
+        tuple(view for view, _, _ in seen), missed, tuple(audit for _, audit, _ in seen), findings
     )  # fmt: skip
 
 
