@@ -33,7 +33,7 @@ from vision3d.render import (
 
 CAMERA = Camera("brown5", (533.0, 533.0, 342.0, 234.0), (-0.28, 0.02, 0.0012, -0.0001, 0.16), (640, 480))
 MOUNT = CameraMount(0.2, 0.5)
-FRAMES, FLOORS = 120, 100
+FRAMES, FLOORS = 120, 60
 LOOKS = ((0.1, 0.7), (0.3, 0.55), (0.9, 0.4), (0.12, 0.35))
 
 
@@ -59,9 +59,9 @@ def plain_floor(rng: np.random.Generator) -> dict[str, Figure]:
     said = f"{FRAMES} frames, dark and light lines"
     return {
         "found_on_plain_floors": Figure(100.0 * found / FRAMES, "%", said, 98.0, 100.0, "higher"),
-        "bottom_error_median": Figure(float(np.median(off[:, 0])), "px", said, 0.5, 0.2),
-        "middle_error_median": Figure(float(np.median(off[:, 1])), "px", said, 0.5, 0.2),
-        "error_95_percent": Figure(float(np.percentile(off, 95)), "px", said, 3.0, 1.5),
+        "bottom_error_median": Figure(float(np.median(off[:, 0])), "px", said, 0.15, 0.05),
+        "middle_error_median": Figure(float(np.median(off[:, 1])), "px", said, 0.15, 0.05),
+        "error_95_percent": Figure(float(np.percentile(off, 95)), "px", said, 0.5, 0.2),
     }
 
 

@@ -12,7 +12,7 @@ from vision3d.lines.stripes import Stripe
 __all__ = ["Curve", "fit_curve", "refine_curve"]
 
 Array = NDArray[np.float64]
-ROUNDS = 4
+ROUNDS = 3
 HUBER = 1.5
 FLOOR = 0.02  # px that a row is never better known than
 BIAS = (0.02, 0.007)  # px, of what repeats from row to row: at the curve's end, and within it

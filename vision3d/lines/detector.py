@@ -51,11 +51,7 @@ def find_line(image: ArrayLike, settings: LineSettings | None = None) -> LineRea
     small, top = _scaled(grey, own, factor)
     if min(small.shape) < 16:
         return no_line(f"the image is too small: {width} by {height} px")
-    stripes = [
-        stripe
-        for dark in {"auto": (True, False), "dark": (True,), "light": (False,)}[own.polarity]
-        for stripe in find_stripes(small, own, dark=dark)
-    ]
+    stripes = find_stripes(small, own)
     rows = small.shape[0]
     middle = (own.middle * (height - 1) + 0.5) / factor - 0.5 - top
     judged = [(stripe, fit_curve(stripe, rows - 1.0, middle)) for stripe in stripes]
@@ -123,7 +119,7 @@ def _parts(stripe: Stripe, curve: Curve, own: LineSettings) -> dict[str, float]:
         "contrast": ramp(stripe.contrast * wide / own.contrast, 0.7, 1.5),
         "even width": ramp(curve.width_spread, 0.45, 0.15),
         "smooth": ramp(curve.rms / max(stripe.width, 4.0), 0.35, 0.1),
-        "clear ground": ramp(stripe.share_of_edges, 0.1, 0.4),
+        "clear ground": ramp(stripe.share_of_edges, 0.1, 0.35),
     }
 
 

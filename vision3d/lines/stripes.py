@@ -16,7 +16,9 @@ Bright = NDArray[np.float32]
 START_ROWS = 5  # rows, evenly over the lowest quarter, in which stripes may begin
 GAP = 0.2  # of the rows: a dash and its gap
 GROWTH = 1.3  # a row wider than this by 2 px more is a junction
+POLARITIES = {"auto": (True, False), "dark": (True,), "light": (False,)}  # which are dark
 NARROWER = 0.4
+LOWER = 0.25  # height of the wide window over its width
 DARKNESS = 16.0  # grey levels: below it differences are noise more than contrast
 WEAK = 0.2  # Sobel's answer in logarithms, below which an edge is noise
 MOST = 24  # stripes of one polarity; more are texture, and not followed
@@ -57,19 +59,22 @@ class Stripe:
         return len(self.left)
 
 
-def find_stripes(small: NDArray[np.uint8], own: LineSettings, *, dark: bool) -> list[Stripe]:
+def find_stripes(small: NDArray[np.uint8], own: LineSettings) -> list[Stripe]:
     """Every stripe that begins in the lowest quarter of the rows.
 
     Brightness is compared by its logarithm, so that a line keeps its contrast in a shadow; the ground is
-    taken from a wide window, and once more from a narrower one that follows the shadow's edge.
+    taken from a wide and low window, which follows light that changes from the bottom up, and once more from
+    a narrower square one, which follows the upright edge of a shadow.
     """
     bright = log_brightness(small)
-    if own.threshold == "otsu":
-        return _from(bright, _difference(bright, _otsu(small), own, dark=dark), own, dark=dark, least=0.0)
+    otsu = own.threshold == "otsu"
+    windows = ((own.window, LOWER), (NARROWER * own.window, 1.0))
+    grounds = [_otsu(small)] if otsu else [_ground(small, *window) for window in windows]
     found: list[Stripe] = []
-    for window in (own.window, NARROWER * own.window):
-        difference = _difference(bright, _ground(small, window), own, dark=dark)
-        found += _from(bright, difference, own, dark=dark, least=own.contrast)
+    for dark in POLARITIES[own.polarity]:
+        for ground in grounds:
+            difference = _difference(bright, ground, own, dark=dark)
+            found += _from(bright, difference, own, dark=dark, least=0.0 if otsu else own.contrast)
     return found
 
 
@@ -123,12 +128,16 @@ def _otsu(small: NDArray[np.uint8]) -> Bright:
     return np.full(small.shape, np.log(level + 0.5 + DARKNESS), dtype=np.float32)
 
 
-def _ground(small: NDArray[np.uint8], window: float) -> Bright:
-    """The ground's brightness: the median round each pixel, which a line does not pull as it pulls a mean."""
+def _ground(small: NDArray[np.uint8], window: float, lower: float) -> Bright:
+    """The ground's brightness: the median round each pixel, which a line does not pull as it pulls a mean.
+
+    `window` is its width as a share of the image's; it is `lower` times as high.
+    """
     import cv2
 
     rows, columns = small.shape
-    coarse = cv2.resize(small, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
+    tall = max(8, round(0.25 * rows / lower))  # OpenCV's median is square
+    coarse = cv2.resize(small, (max(8, columns // 4), tall), interpolation=cv2.INTER_AREA)
     half = max(1, min(int(0.5 * window * coarse.shape[1]), 120))
     beyond = cv2.copyMakeBorder(coarse, half, half, half, half, cv2.BORDER_REFLECT)
     level = cv2.medianBlur(beyond, 2 * half + 1)[half:-half, half:-half]
