@@ -116,7 +116,7 @@ def test_an_open_pose_says_what_to_do(task):
     reading = task._placed((TrackedMarker(3, both, seen=True, since_s=0.0, measured=both, marker=marker,
                                           velocity=np.zeros(6)),))  # fmt: skip
     assert (reading.headline, reading.state) == ("1 marker, 1 with two poses", "warn")
-    assert reading.notes == ("3: two poses fit, odds 2 : 1; tilt it, or come nearer",)
+    assert reading.notes == ("3: two poses fit, odds 1.5 : 1; tilt it, or come nearer",)
     assert {mark.role for mark in reading.marks} == {"warn", "x", "y", "z"}
     row = reading.rows[0]
     assert row["odds"] == pytest.approx(1.5)

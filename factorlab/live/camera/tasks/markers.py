@@ -208,7 +208,9 @@ def translation_cov(one: TrackedMarker) -> Array:
 
 def _odds(one: TrackedMarker) -> str:
     odds = one.pose.odds
-    return f"{odds:.0f} : 1" if odds < MOST_ODDS else "sure"
+    if odds >= MOST_ODDS:
+        return "sure"
+    return f"{odds:.1f} : 1" if odds < 10 else f"{odds:.0f} : 1"
 
 
 def _table_row(one: TrackedMarker) -> tuple[Any, ...]:
