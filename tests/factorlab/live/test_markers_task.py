@@ -122,3 +122,11 @@ def test_an_open_pose_says_what_to_do(task):
     assert row["odds"] == pytest.approx(1.5)
     assert row["sigma_z_m"] == pytest.approx(2e-3, rel=0.05)
     assert (row["other_qx"], row["other_z_m"]) == pytest.approx((-np.sin(0.1), 1.1))
+
+
+def test_photographs_are_looked_at_alone(task, images):
+    whole = [Frame(k, k, frame(0, images[12 * k]).image, f"{k}.png", still=True) for k in range(2)]
+    task.read(whole[0])
+    together = task.read(whole[1]).rows
+    alone = MarkersTask(KnownCamera(CAMERA), MARKER_M, "4x4_50").read(whole[1]).rows
+    assert together == alone

@@ -76,6 +76,8 @@ class MarkersTask(Task):
         if self._last is None or self._last[0] is not frame:
             markers = self._found(np.asarray(frame.grey))
             self._ids.update(marker.id for marker in markers)
+            if frame.still and self._camera is not None:  # a photograph says nothing about the one before
+                self._tracker = MarkerTracker(self._camera, self._size_m)
             if self._tracker is None:
                 reading = self._numbered(markers)
             else:
