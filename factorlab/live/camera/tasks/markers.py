@@ -21,7 +21,7 @@ from vision3d.pose import project_object
 __all__ = ["MarkersTask"]
 
 Array = NDArray[np.float64]
-MOST_ODDS = 1e6  # beyond, odds are not told: nobody knows the corners' errors so well
+TOLD_ODDS, MOST_ODDS = 1e3, 1e6  # on the page and in the table; nobody knows the corners' errors better
 PATIENCE = 50  # frames without a marker, after which a dictionary that was found out is looked for anew
 TRACED = 3  # markers whose distance the page draws over time
 PLACE = ("x_m", "y_m", "z_m")
@@ -210,8 +210,8 @@ def translation_cov(one: TrackedMarker) -> Array:
 
 def _odds(one: TrackedMarker) -> str:
     odds = one.pose.odds
-    if odds >= MOST_ODDS:
-        return "sure"
+    if odds > TOLD_ODDS:
+        return f"> {TOLD_ODDS:.0f} : 1"
     return f"{odds:.1f} : 1" if odds < 10 else f"{odds:.0f} : 1"
 
 
