@@ -122,7 +122,9 @@ def _detection(done: CalibratedCamera) -> dict[str, Any]:
     audits = done.detections.audits
     return {
         "window_px": done.settings.window,
-        "window_too_large": [audit.name for audit in audits if audit.window_too_large],
+        "window_too_large": [
+            audit.name for audit in audits if done.settings.window is not None and audit.window_too_large
+        ],
         "moved": [
             {"picture": audit.name, "corner": corner, "by_px": px}
             for audit in audits

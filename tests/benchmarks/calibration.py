@@ -48,7 +48,7 @@ def sample_figures() -> dict[str, Figure]:
     said = (
         f"lens {own['camera']['lens']}, fx {own['camera']['parameters']['fx']:.2f}; tutorial 0.408, 5x5 0.195"
     )
-    flagged = forced["detection"]["window_too_large"]
+    flagged = forced["detection"]["moved"]
     return {
         "left_views_used": Figure(own["views"]["used"], "views", "of 13", 13, 13, "higher"),
         "left_rms": Figure(own["rms_px"], "px", said, 0.20, 0.197),

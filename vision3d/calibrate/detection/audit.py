@@ -58,7 +58,7 @@ def audited(
         blur_px=float(np.median(refined.blur_px)), contrast=float(np.median(np.abs(refined.contrast))),
         suspicious=strange, lost=found.lost, moved=moved, mirrored=found.mirrored,
     )  # fmt: skip
-    findings = (*found.notes, *_findings(board, audit))
+    findings = (*found.notes, *_findings(board, audit, forced=window is not None))
     return View(name, size, points, pixels, ids, np.hypot(sigma, extra), findings), audit
 
 
@@ -71,9 +71,9 @@ def _moved(ids: NDArray[np.int64], by: Array, sigma: Array) -> tuple[tuple[int, 
     )
 
 
-def _findings(board: Board, audit: ViewAudit) -> tuple[str, ...]:
+def _findings(board: Board, audit: ViewAudit, *, forced: bool) -> tuple[str, ...]:
     said = []
-    if audit.window_too_large:
+    if forced and audit.window_too_large:
         worst = int(np.argmin(audit.allowed_px))
         carried = (
             f"; it moves {_corners(board, [i for i, _ in audit.moved])} by up to {audit.moved[0][1]:.1f} px"
