@@ -173,22 +173,9 @@ def _mount(options: dict[str, Any]) -> tuple[CameraMount, Any]:
 
 def _camera(options: dict[str, Any], size: tuple[int, int]) -> Camera:
     """The calibration, which must be that of the images."""
-    from sequential.errors import DataError, FileFormatError
-    from vision3d.camera_files import read_camera
+    from vision3d.camera_files.sized import read_camera_for
 
-    path = options["camera_file"]
-    try:
-        camera = read_camera(path, which=options["which"])
-    except FileFormatError as error:
-        if "how large its images are" not in str(error):
-            raise
-        camera = read_camera(path, which=options["which"], size=size)
-    if camera.size != size:
-        raise DataError(
-            f"{path} is the calibration of images of {camera.size[0]}x{camera.size[1]} px, these are "
-            f"{size[0]}x{size[1]}; calibrate at the size you use"
-        )
-    return camera
+    return read_camera_for(options["camera_file"], size, which=options["which"])
 
 
 def _from_camera(
