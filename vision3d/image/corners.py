@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import DataError
-from vision3d.image.borders import Border, cv2_border
+from vision3d.image.borders import Border, cv2_border, pad
 from vision3d.image.filters import box_sums
 from vision3d.image.gradients import sobel
 from vision3d.image.morphology import dilate
@@ -66,6 +66,8 @@ def harris(
         * np.float32(scale)
         for axis in (0, 1)
     )
+    if backend != "numpy":
+        return _compiled(dx, dy, block, k, score, border)
     xx, xy, yy = (
         box_sums(product, block, border=border, backend=backend).astype(np.float32)
         for product in (dx * dx, dx * dy, dy * dy)
@@ -74,6 +76,19 @@ def harris(
         return np.asarray(xx * yy - xy * xy - np.float32(k) * (xx + yy) ** 2, np.float32)
     half = (xx - yy) / 2
     return np.asarray((xx + yy) / 2 - np.sqrt(half * half + xy * xy), np.float32)
+
+
+def _compiled(
+    dx: NDArray[np.float32], dy: NDArray[np.float32], block: int, k: float, score: Score, border: Border
+) -> NDArray[np.float32]:
+    """The same from one loop; derivatives padded have the products that products padded would have."""
+    from vision3d.kernels import image_corners
+
+    around = (block // 2, block - 1 - block // 2) * 2
+    out = np.empty(dx.shape, np.float32)
+    wide = [pad(np.asarray(one), *around, border) for one in (dx, dy)]
+    image_corners.scores(wide[0], wide[1], block, k, score == "shi-tomasi", out)
+    return out
 
 
 def corners(
