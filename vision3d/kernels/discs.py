@@ -25,7 +25,6 @@ __all__ = ["fit_discs"]
 P = 10
 ROOT2 = math.sqrt(2.0)
 SHARPEST, BLURRED = 0.45, 8.0  # px
-BORDER_PX = 6.0
 
 
 @inlined
@@ -55,7 +54,7 @@ def _model(q, unused, unused_too, x, y, row):
 
 
 @inlined
-def _gather(image, cx, cy, shape, outer, px, py, value):
+def _gather(image, cx, cy, shape, outer, border, px, py, value):
     """Pixels near the border of the expected ellipse, out to `outer` radii; their number."""
     h, w = image.shape
     det = shape[0] * shape[2] - shape[1] * shape[1]
@@ -67,7 +66,7 @@ def _gather(image, cx, cy, shape, outer, px, py, value):
             mu, mv = shape[0] * u + shape[1] * v, shape[1] * u + shape[2] * v
             rho = math.sqrt(max(u * mu + v * mv, 1e-12))
             d = (rho - 1.0) * rho / max(math.sqrt(mu * mu + mv * mv), 1e-12)
-            if rho <= outer and abs(d) <= BORDER_PX and n < len(px):
+            if rho <= outer and abs(d) <= border and n < len(px):
                 px[n], py[n], value[n] = x, y, image[y, x]
                 n += 1
     return n
@@ -98,10 +97,10 @@ def _start(q, cx, cy, shape, n, px, py, value):
 @kernel(
     numba.void(
         numba.float32[:, ::1], numba.float64[:, ::1], numba.float64[:, ::1], numba.float64,
-        numba.float64[:, ::1], numba.float64[:, ::1], numba.float64[:, ::1],
+        numba.float64, numba.float64[:, ::1], numba.float64[:, ::1], numba.float64[:, ::1],
     )
 )  # fmt: skip
-def fit_discs(image, starts, shapes, outer, centres, covs, facts):
+def fit_discs(image, starts, shapes, outer, border, centres, covs, facts):
     """Fit an ellipse at every start.
 
     Parameters
@@ -110,6 +109,7 @@ def fit_discs(image, starts, shapes, outer, centres, covs, facts):
     starts : (N, 2) px
     shapes : (N, 3) 1/px² expected M of the ellipses: a, b, c
     outer : how far out pixels are looked at, in radii
+    border : how far from the border of the ellipse pixels are looked at, in px
     centres : (N, 2) px out, of the ellipses; NaN where the fit failed
     covs : (N, 3) px² out: xx, xy, yy for residuals of the size found
     facts : (N, 8) out: rms of the residuals, h, s, pixels used, px moved from the start, M of the ellipse
@@ -131,7 +131,7 @@ def fit_discs(image, starts, shapes, outer, centres, covs, facts):
         covs[c, :] = np.nan
         facts[c, :] = np.nan
         cx, cy = starts[c, 0], starts[c, 1]
-        n = _gather(image, cx, cy, shapes[c], outer, px, py, value)
+        n = _gather(image, cx, cy, shapes[c], outer, border, px, py, value)
         facts[c, 3] = n
         if n < 2 * P:
             continue

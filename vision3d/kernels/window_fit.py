@@ -14,6 +14,7 @@ from vision3d.kernels import inlined
 __all__ = ["covariance", "fit_window"]
 
 ITERATIONS = 50
+SETTLED = 1e-4  # px
 
 
 @inlined
@@ -120,7 +121,8 @@ def fit_window(model, q, a, b, n, px, py, value, bounded, low, high, reach, work
             for i in range(p):
                 q[i] = tried[i]
             damping = max(damping * 0.2, 1e-6)
-            if gain <= 1e-7 * cost + 1e-9 and abs(step[0]) + abs(step[1]) < 1e-3:
+            moved = abs(step[0]) + abs(step[1])
+            if moved < SETTLED or (moved < 10.0 * SETTLED and gain <= 1e-6 * cost + 1e-9):
                 return cost
         else:
             damping *= 8.0

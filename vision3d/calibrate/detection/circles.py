@@ -26,6 +26,8 @@ FILLED = 0.7
 STIFF, DOUBT = 0.2, 0.5
 """A lens that hardly bends, and what share of the difference that it makes to the bias counts as its sigma:
 at the rim of a tilted grid, the grid alone does not tell how much the lens bends."""
+BORDER_PX, BORDER_BLURS = 3.5, 3.5
+"""How far from a circle's border pixels are looked at: at least, and in standard deviations of the blur."""
 OUTER = 1.7
 """How far out a circle's pixels are looked at, in radii, and never past the middle between two circles."""
 
@@ -85,7 +87,7 @@ def _fitted(grey: Grey, starts: Array, ids: Ids, board: CircleGrid) -> tuple[Ref
     centres, covs, facts = np.empty((n, 2)), np.empty((n, 3)), np.empty((n, 8))
     at, bias = np.array(starts, dtype=np.float64), np.zeros((n, 2))
     doubt = np.zeros(n)
-    good = np.zeros(n, dtype=np.bool_)
+    good, border = np.zeros(n, dtype=np.bool_), 1.5 * BORDER_PX
     for _ in range(2):
         smooth = fit_smooth(board.points[ids], at, (grey.shape[1], grey.shape[0]))
         if smooth is None:
@@ -93,8 +95,10 @@ def _fitted(grey: Grey, starts: Array, ids: Ids, board: CircleGrid) -> tuple[Ref
         bias, shapes = circle_images(smooth.at, plane, radius)
         if (stiff := fit_smooth(board.points[ids], at, (grey.shape[1], grey.shape[0]), STIFF)) is not None:
             doubt = DOUBT * np.linalg.norm(circle_images(stiff.at, plane, radius)[0] - bias, axis=1)
-        fit_discs(image, np.ascontiguousarray(at + bias), shapes, outer, centres, covs, facts)
+        fit_discs(image, np.ascontiguousarray(at + bias), shapes, outer, border, centres, covs, facts)
         good = _believable(facts, shapes)
+        if good.any():
+            border = max(BORDER_PX, BORDER_BLURS * float(np.median(facts[good, 2])))
         at = np.where(good[:, None], centres - bias, at)
     sigma = np.sqrt(0.5 * (covs[:, 0] + covs[:, 2]) + FLOOR_PX**2 + doubt**2)
     at[~good], sigma[~good] = np.nan, np.nan
