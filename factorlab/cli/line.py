@@ -64,21 +64,23 @@ def line_options(command: Command) -> Command:
 @line_options
 @in_one_sentence
 def line(source: str, **options: Any) -> int:
-    """Offset and heading of the line on the ground in SOURCE: a picture, a folder or a video.
+    """Offset and heading of the line on the ground in SOURCE: a picture, a folder, a video, or a camera (0).
 
     The line is the stripe, dark or light, that runs from the bottom of the image up to its middle and stands
     out from the ground; where there is none, that is the answer, with what the picture shows instead.  With
     the calibration of the camera and where it hangs, or with marks on the ground, the answer is in metres.
+    Ctrl-C ends the reading of a camera; what was read until then is reported.
     """
     from factorlab.cli.delivery import deliver, require_output
     from factorlab.cli.progress import bar
+    from factorlab.cli.stopping import stopping
     from factorlab.lines import line_document, line_files, read_lines
 
     out = options["out"]
     require_output(out, None, force=options["force"])
     job = _job(options)
-    with bar("line", shown=_on_terminal()) as progress, _video(out) as film:
-        run = read_lines(source, job, progress, film.add if film else None)
+    with bar("line", shown=_on_terminal()) as progress, _video(out) as film, stopping() as stop:
+        run = read_lines(source, job, progress, film.add if film else None, stop.is_set)
         files = line_files(run) if out is not None else {}
         if film is not None and not run.is_picture:
             files["line.avi"] = film.content()

@@ -98,13 +98,18 @@ class LineRun:
 
 
 def read_lines(
-    source: str, job: LineJob, progress: Progress = lambda *_: None, on_frame: OnFrame | None = None
+    source: str,
+    job: LineJob,
+    progress: Progress = lambda *_: None,
+    on_frame: OnFrame | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> LineRun:
     """Read every frame of a picture, a folder or a video.
 
     Parameters
     ----------
     source : as `vision3d.frames.open_frames` takes it
+    stop : asked before every frame whether it was enough; a camera has no end of its own
     on_frame : called with every frame, what was read in it, and frames a second; such as to draw it
 
     Raises
@@ -119,6 +124,8 @@ def read_lines(
         ground = job.ground(frames.size)
         every = max(1, (frames.count or KEPT) // KEPT)
         for frame in frames:
+            if stop():
+                break
             reads.append(_read(frame, job, ground))
             if frame.index % every == 0 and len(pictures) < 2 * KEPT:
                 pictures[frame.index] = frame.image

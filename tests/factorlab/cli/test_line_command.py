@@ -189,3 +189,17 @@ def test_results_are_not_overwritten(folder, tmp_path):
     assert run(folder / "line.png", "-o", tmp_path / "out").exit_code == 0
     assert run(folder / "line.png", "-o", tmp_path / "out").exit_code == 1
     assert run(folder / "line.png", "-o", tmp_path / "out", "--force").exit_code == 0
+
+
+def test_reading_ends_when_asked_to_and_keeps_what_it_has(folder):
+    from factorlab.lines import LineJob, read_lines
+
+    seen = []
+    run = read_lines(
+        str(folder / "drive.avi"),
+        LineJob(),
+        on_frame=lambda frame, *_: seen.append(frame.index),
+        stop=lambda: len(seen) == 5,
+    )
+    assert len(run.reads) == 5
+    assert run.found.all()
