@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 __all__ = ["markers_document"]
 
+COURSES_READ = (
+    "The likelier pose, with 2σ. Odds: lines are of the track, dots of single frames; both pause where "
+    "there is one reading only."
+)
 SMALL_PX = 20.0
 UNLIKELY = 1e-4  # a reading that no table shows; `--json` has it
 MISFIT = 4.0  # times the variance of corners that a square may ask for
@@ -43,7 +47,8 @@ def markers_document(read: MarkersRead, command: str = "") -> Document:
     with_poses = read.camera is not None and read.settings.size_m is not None
     side = f", {1e3 * (read.settings.size_m or 0.0):g} mm wide" if with_poses else ""
     numbers = ", ".join(map(str, read.ids))
-    who = f"Markers {numbers}{named}{side}" if read.ids else "No marker"
+    many = "Markers" if len(read.ids) > 1 else "Marker"
+    who = f"{many} {numbers}{named}{side}" if read.ids else "No marker"
     lead = f"{who} in {what} of {width}x{height}."
     if not with_poses:
         lead += " Give --camera and --size for their poses."
@@ -129,7 +134,9 @@ def _sections(read: MarkersRead) -> list[Section]:
     if read.moving and read.readings:
         sections.append(_track_table(read))
         if with_poses:
-            sections.append(Section("Distance, tilt and odds", figure=lambda: figures.tracks(read)))
+            sections.append(
+                Section("Distance, tilt and odds", figure=lambda: figures.tracks(read), caption=COURSES_READ)
+            )
     return sections
 
 

@@ -29,6 +29,11 @@ def picture(drawn: NDArray[np.uint8]) -> Figure:
     return figure
 
 
+def _drawn(odds: float) -> float:
+    """Odds as they are drawn: not at all where there is one reading only."""
+    return min(odds, HIGHEST) if np.isfinite(odds) else np.nan
+
+
 def tracks(read: MarkersRead) -> Figure | None:
     """Distance with its 2σ, tilt, and odds of the first markers; dots are single frames."""
     figure, axes = blank(6.4, 3, 1, sharex=True)
@@ -45,9 +50,9 @@ def tracks(read: MarkersRead) -> Figure | None:
         axes[0, 0].plot(t, away, color=colour, label=str(number))
         axes[0, 0].fill_between(t, away - 2 * sigma, away + 2 * sigma, color=colour, alpha=0.2, linewidth=0)
         axes[1, 0].plot(t, np.degrees([mode.tilt_rad for mode in modes]), color=colour)
-        odds = [min(one.pose.odds, HIGHEST) for one in rows if one.pose is not None]
+        odds = [_drawn(one.pose.odds) for one in rows if one.pose is not None]
         axes[2, 0].plot(t, odds, color=colour)
-        alone = [(one.t_s, min(one.alone.odds, HIGHEST)) for one in rows if one.alone is not None]
+        alone = [(one.t_s, _drawn(one.alone.odds)) for one in rows if one.alone is not None]
         axes[2, 0].plot(*np.array(alone).T, ".", color=colour, markersize=3.0, alpha=0.6)
     for ax, label in zip(axes[:, 0], ("distance, m", "tilt, °", "odds"), strict=True):
         ax.set_ylabel(label)

@@ -231,19 +231,35 @@ def _turned(
 
 
 def _reduced(found: Hypotheses) -> Hypotheses:
-    """The best two that differ; those like a better one give it their weight.  Weights then add up to one."""
+    """The best two that differ; those like a better one are merged with it.  Weights then add up to one."""
     order = np.argsort(-found.log_weight, kind="stable")
     top = found.log_weight[order[0]]
     found = found.take(order[found.log_weight[order] > max(top + LEAST_LOG_WEIGHT, -1e300)])
-    weights, kept = found.log_weight.copy(), [0]
+    kept = [found.take([0])]
     for k in range(1, len(found)):
-        step = POSES.local(found.pose[kept], found.pose[k])
-        spread = found.cov[kept, :6, :6] + found.cov[k, :6, :6]
-        apart = np.einsum("ki,ki->k", step, np.linalg.solve(spread, step[:, :, None])[:, :, 0])
+        one = found.take([k])
+        apart = [_apart(other, one) for other in kept]
         near = int(np.argmin(apart))
         if apart[near] < SAME:
-            weights[kept[near]] = np.logaddexp(weights[kept[near]], weights[k])
+            kept[near] = _merged(kept[near], one)
         elif len(kept) < 2:
-            kept.append(k)
-    kept.sort(key=lambda k: -weights[k])
-    return found.take(kept).weighing(weights[kept] - np.logaddexp.reduce(weights[kept]))
+            kept.append(one)
+    both = Hypotheses.joined(sorted(kept, key=lambda one: -one.log_weight[0]))
+    return both.weighing(both.log_weight - np.logaddexp.reduce(both.log_weight))
+
+
+def _apart(a: Hypotheses, b: Hypotheses) -> float:
+    """Squared Mahalanobis distance of the poses of two single hypotheses."""
+    step = POSES.local(a.pose[0], b.pose[0])
+    return float(step @ np.linalg.solve(a.cov[0, :6, :6] + b.cov[0, :6, :6], step))
+
+
+def _merged(a: Hypotheses, b: Hypotheses) -> Hypotheses:
+    """One hypothesis with the mean and the covariance of two that are near each other."""
+    weight = np.logaddexp(a.log_weight, b.log_weight)
+    share = float(np.exp(b.log_weight - weight)[0])
+    step = np.concatenate([POSES.local(a.pose[0], b.pose[0]), b.velocity[0] - a.velocity[0]])
+    cov = (1.0 - share) * a.cov + share * b.cov + share * (1.0 - share) * np.outer(step, step)
+    return Hypotheses(
+        POSES.retract(a.pose, share * step[None, :6]), a.velocity + share * step[6:], cov, weight
+    )
