@@ -48,6 +48,7 @@ class MarkersTask(Task):
     def __init__(self, known: KnownCamera, size_m: float = 0.05, dictionary: str = "auto") -> None:
         self._known, self._size_m, self._asked = known, size_m, dictionary
         self._dictionary, self._tried, self._blind = dictionary, 0, 0
+        self._tracker: MarkerTracker | None = None
         self._ids: set[int] = set()
         self._last: tuple[Frame, Reading] | None = None
         self.restart()
