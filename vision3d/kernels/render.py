@@ -27,6 +27,7 @@ from vision3d.kernels.polygons import VERTICES, cover
 __all__ = ["CELLS", "DISTANCE", "PICTURE", "develop", "paint"]
 
 CELLS, DISTANCE, PICTURE = 0, 1, 2
+NOWHERE = -9  # behind the camera, or no ray
 f_image, w_image = types.Array(types.float32, 2, "C", readonly=True), types.float32[:, ::1]
 
 
@@ -126,7 +127,7 @@ def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, values, radii, in
             qc = h20 * dx + h21 * dy + h22 * dz
             a[now, j], b[now, j], c[now, j] = qa, qb, qc
             if not (qc > 0.0):
-                codes[now, j] = -9  # behind the camera, or no ray
+                codes[now, j] = NOWHERE
                 continue
             inverse = 1.0 / qc
             x, y = qa * inverse, qb * inverse
@@ -157,7 +158,10 @@ def paint(image, rays, plane_from_ray, kind, x_edges, y_edges, values, radii, in
             y0, y1, y2, y3 = ys[past, j], ys[past, j + 1], ys[now, j + 1], ys[now, j]
             c0, c1, c2, c3 = c[past, j], c[past, j + 1], c[now, j + 1], c[now, j]
             nearest, farthest = min(c0, c1, c2, c3), max(c0, c1, c2, c3)
-            flat = nearest > 0.98 * farthest  # and so no corner is behind the camera
+            # no corner is behind the camera or without a ray (NaN, which min and max may pass over)
+            known = codes[past, j] != NOWHERE and codes[past, j + 1] != NOWHERE
+            known = known and codes[now, j] != NOWHERE and codes[now, j + 1] != NOWHERE
+            flat = known and nearest > 0.98 * farthest
             straight = kind == CELLS
             if same and kind != PICTURE:
                 # how far a curved edge is from the pixel, against the pixel's own extent

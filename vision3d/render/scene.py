@@ -159,7 +159,7 @@ def _paint(image: NDArray[np.float32], camera: Camera, plane: Plane, moment: flo
     )  # fmt: skip
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=3)
 def _corner_rays(camera: Camera) -> NDArray[np.float64]:
     """Rays (h + 1, w + 1, 3) through the corners of the pixels, kept for the next image of this camera."""
     width, height = camera.size

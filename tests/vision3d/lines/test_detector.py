@@ -78,6 +78,21 @@ def test_uneven_light_is_no_line(rng):
     assert find_line(np.clip(image * shade, 0, 255).astype(np.uint8)).found
 
 
+@pytest.mark.parametrize("angle", [0.0, 60.0, 120.0, 180.0, 240.0, 300.0])
+def test_a_line_is_followed_into_the_shadow(angle, rng):
+    line = random_line(rng, width_m=0.04, bend_per_m=0.3)
+    pose = line.at(0.5)
+    image = render_ground(CAMERA, MOUNT, line, pose, rng=rng).astype(float)
+    u, v = np.meshgrid(np.arange(640) - 320.0, np.arange(480) - 300.0)
+    side = u * np.cos(np.radians(angle)) + v * np.sin(np.radians(angle))
+    dim = image * (1.0 - 0.5 / (1.0 + np.exp(-side / 25.0)))
+    reading = find_line(dim.astype(np.uint8))
+    assert reading.found, reading.reason
+    truth = line_pixels(CAMERA, MOUNT, line, pose, ROWS)
+    assert abs(reading.bottom_px[0] - truth[0]) < 1.0
+    assert abs(reading.middle_px[0] - truth[1]) < 1.0
+
+
 def test_a_dashed_line_is_followed_over_its_gaps(rng):
     straight = GroundLine(np.array([[-1.0, 0.0], [3.0, 0.0]]), 0.04)
     image = render_ground(CAMERA, MOUNT, straight, np.zeros(3), rng=rng)

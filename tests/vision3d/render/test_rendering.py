@@ -141,6 +141,18 @@ def test_behind_the_camera_and_edge_on_there_is_nothing():
         np.testing.assert_array_equal(shown, np.float32(BACK))
 
 
+def test_where_the_lens_has_no_ray_there_is_the_background():
+    folded = Camera("brown1", (60.0, 60.0, 36.2, 26.1), (-0.9,), SIZE)
+    rays = folded.unproject(np.stack(np.meshgrid(np.arange(72.0), np.arange(54.0)), axis=-1))
+    nowhere = np.isnan(rays[..., 0])
+    assert 0.05 < nowhere.mean() < 0.9
+    wall = cells([-20.0, 0.05, 20.0], [-20.0, 20.0], [[0.9, 0.1]])
+    shown = radiance_of(folded, [Plane(np.array([1.0, 0, 0, 0, 0, 0, 0.3]), wall)], background=BACK)
+    np.testing.assert_array_equal(shown[nowhere], np.float32(BACK))
+    assert (shown[~nowhere] == np.float32(BACK)).mean() < 0.2, "but for the pixels on the border"
+    assert np.isfinite(shown).all()
+
+
 def test_noise_grows_with_the_signal(rng):
     one = Camera("pinhole", (200.0, 200.0, 99.5, 99.5), (), (200, 200))
     for reflectance in (0.1, 0.8):
