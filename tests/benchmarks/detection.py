@@ -92,9 +92,7 @@ def real_figures() -> dict[str, Figure]:
     moved = [len(audit.moved) for audit in detect_views(left, LEFT, window=11).audits]
     figures = {
         "left_found": Figure(len(detect_views(left, LEFT).views), "images", "of 13", 13, 13, "higher"),
-        "left_moved_by_window_11": Figure(
-            sum(moved), "corners", "15 by eye: 6 + 5 + 3 + 1", 1, None, "higher"
-        ),
+        "left_moved_by_window_11": Figure(sum(moved), "corners", "15 between windows", 1, None, "higher"),
     }
     for name, count in (("choriginal", 24), ("chocclusion_original", 16)):
         image = cv2.imread(str(folder / "aruco" / f"{name}.jpg"))
