@@ -134,14 +134,11 @@ def _shape(done: CalibratedCamera) -> list[Verdict]:
 
 def _agreement(done: CalibratedCamera) -> Verdict:
     """Whether the pictures ask for one camera."""
-    times = done.calibration.inflation
-    if times <= 1.0:
+    times, remarks = done.calibration.inflation, done.calibration.report.remarks
+    if times <= 1.0 and not remarks:
         meaning = "they scatter no more than independent corners do"
         return Verdict("pictures against each other", times, None, "PASS", meaning, unit="σ")
-    meaning = (
-        "the corners of one picture err together: pictures ask for cameras that differ by this many σ of "
-        "independent corners; every σ told here takes that in"
-    )
+    meaning = "; ".join((*remarks, "every σ told here takes that in"))
     status: Status = "INFO" if times < SCATTERED else "WARN"
     action = (
         "" if times < SCATTERED else "one camera, focus and zoom fixed? A flat board? The right lens model?"
@@ -241,7 +238,6 @@ def _others(done: CalibratedCamera) -> list[Verdict]:
         meaning = f"{fit.views[view].name} fits {ratio:.1f} times worse than the others and counts less"
         action = "look at its corners, or leave it out"
         found.append(Verdict("picture that does not fit", None, None, "WARN", meaning, action))
-    found += [Verdict("what σ holds", None, None, "INFO", text) for text in fit.report.remarks]
     return found
 
 
