@@ -3,7 +3,7 @@
 The two minima of `plane_minima` are compared by the probability around each, not by their residuals: the
 density of the tilt (the other four coordinates are integrated out by Laplace's method) is summed over a
 grid that covers both basins, which are parted where the line between the minima is lowest: sharply where
-the valley is deep, softly where there is hardly one (0.3 of the way between them, by the odds of the
+the valley is deep, softly where there is hardly one (a quarter of the way between them, by the odds of the
 valley). Where a minimum is sharp and far from the other, Laplace's method alone does the same for less.
 """
 
@@ -173,7 +173,7 @@ def integrate(V, tilt, f, count, separation, cut, floor, R, t, X, n, A, W, rows,
         )  # fmt: skip
     for m in range(count):
         side = 0
-        width = 0.3 * separation * math.exp(min(floor - min(f[0], f[1]), 0.0)) + 1e-9 if count == 2 else 1.0
+        width = 0.25 * separation * math.exp(min(floor - min(f[0], f[1]), 0.0)) + 1e-9 if count == 2 else 1.0
         if joined:
             side = 1 if m == 0 else -1
         else:

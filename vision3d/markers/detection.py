@@ -11,8 +11,7 @@ whose scatter says what each corner is worth (`vision3d.kernels.quad_edges`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,6 @@ from vision3d.markers.dictionaries import (
     DICTIONARIES,
     FAMILIES,
     dictionary_name,
-    opencv_dictionary,
     smallest_of,
     surprise,
 )
@@ -40,7 +38,7 @@ UNREFINED_PX = 0.5  # corners as OpenCV's contours give them
 REACH_PX = 2.5
 CURVATURE_PX = 2e-4  # half the curvature (1/px) that a lens without a name may give to a straight side
 INWARD_PX = 0.5  # a contour runs through the outermost dark pixels
-SMALLEST_PX = 10.0
+CONTOUR = 2  # OpenCV's CORNER_REFINE_CONTOUR: lines through contours, a start for ours
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +97,7 @@ class Marker:
 def detect_markers(
     image: NDArray[np.uint8], dictionary: str = "auto", *, camera: Camera | None = None
 ) -> tuple[Marker, ...]:
-    """Find the markers of a dictionary, in the order of their numbers.
+    """Find the markers of a dictionary, in the order of their numbers; of one number the largest comes first.
 
     Parameters
     ----------
@@ -153,23 +151,13 @@ def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)
 
 
-@cache
-def _detector(name: str) -> Any:
-    """OpenCV's detector, its corners left as the contours give them."""
-    import cv2
-
-    settings = cv2.aruco.DetectorParameters()
-    settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
-    return cv2.aruco.ArucoDetector(opencv_dictionary(name), settings)
-
-
 def _squares(grey: NDArray[np.uint8], name: str) -> tuple[Array, NDArray[np.int64]]:
-    """What OpenCV reads: corners (M, 4, 2) and numbers (M,), each number once (its largest square)."""
-    found, numbers, _ = _detector(name).detectMarkers(grey)
-    ids = np.zeros(0, dtype=np.int64) if numbers is None else np.asarray(numbers, dtype=np.int64).reshape(-1)
-    quads = np.array([np.asarray(one, dtype=np.float64).reshape(4, 2) for one in found]).reshape(-1, 4, 2)
-    order = np.lexsort((-_sides(quads), ids))
-    return np.ascontiguousarray(_grown(quads[order])), ids[order]
+    """What OpenCV reads: corners (M, 4, 2) and numbers (M,), of one number the largest square first."""
+    from vision3d import cv
+
+    found = cv.detect_markers(grey, name, parameters={"cornerRefinementMethod": CONTOUR})
+    order = np.lexsort((-_sides(found.corners), found.ids))
+    return np.ascontiguousarray(_grown(found.corners[order])), found.ids[order]
 
 
 def _grown(quads: Array) -> Array:

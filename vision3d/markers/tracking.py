@@ -108,7 +108,8 @@ class MarkerTracker:
         self.t = t
         for number in [k for k, track in self.tracks.items() if t - track.last > self.forget_s]:
             del self.tracks[number]
-        known = [one for one in markers if self._size(one.id) is not None]
+        first = {one.id: one for one in reversed(markers)}  # of several with one number the largest
+        known = [one for one in first.values() if self._size(one.id) is not None]
         poses = marker_poses(self.camera, known, [self._size(one.id) or 0.0 for one in known])
         seen = {one.id: (one, pose) for one, pose in zip(known, poses, strict=True) if pose is not None}
         told = self._coasted([number for number in self.tracks if number not in seen])

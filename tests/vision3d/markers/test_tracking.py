@@ -107,3 +107,10 @@ def test_pictures_come_in_order(rng):
     tracker.update(1.0, [])
     with pytest.raises(TimeOrderError, match="order of time"):
         tracker.update(1.0, [])
+
+
+def test_of_two_markers_with_one_number_the_first_is_followed(rng):
+    near, far = tilted(90.0, 35, rng), tilted(40.0, 35, rng, at=(0.3, 0.0))
+    told = MarkerTracker(PINHOLE, SIZE_M).update(0.0, [seen(near, rng), seen(far, rng)])
+    assert len(told) == 1
+    assert abs(told[0].pose.modes[0].distance_m - np.linalg.norm(near[4:])) < 0.1
