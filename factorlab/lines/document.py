@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factorlab.lines.job import LineRun, Read
+from factorlab.lines.job import LineRun, Read, has_lane
 from factorlab.lines.numbers import run_numbers
 from factorlab.report.document import Document, Section, Status, Table, Verdict
 from vision3d.lines import LineReading
@@ -18,6 +18,7 @@ FOUND = (
     "Blue: the line's edges. Orange: its middle at the bottom and in the row that looks ahead. "
     "Dashed: straight ahead."
 )
+LANE = "Green: the lane. Orange: the inner edges of its sides."
 NOT_FOUND = "Straight segments; those of one colour aim at one point, grey ones at none."
 
 
@@ -42,8 +43,13 @@ def line_document(run: LineRun, command: str = "") -> Document:
 def _conclusion(run: LineRun) -> str:
     """The answer in one sentence."""
     if not run.is_picture:
-        return f"The line was seen in {100 * run.found.mean():.0f} % of {len(run.reads)} frames."
+        what = "line or a lane" if run.job.lane else "line"
+        return f"A {what} was seen in {100 * run.found.mean():.0f} % of {len(run.reads)} frames."
     read = run.reads[0]
+    if read.lane is not None and has_lane(read) and not read.line.found:
+        lane_side = "right" if read.lane.offset > 0 else "left"
+        aside = f"its middle {100 * abs(read.lane.offset):.0f} % of its width to the {lane_side}"
+        return f"A lane, {aside}, running {_leaning(read.lane.heading_rad)} in the image."
     if read.line.found:
         side = "right" if read.line.offset > 0 else "left"
         shade, share = "dark" if read.line.dark else "light", abs(100 * read.line.offset)
@@ -67,6 +73,8 @@ def _leaning(angle_rad: float) -> str:
 
 def _picture_verdicts(run: LineRun) -> list[Verdict]:
     read = run.reads[0]
+    if has_lane(read) and not read.line.found:
+        return [_lane_verdict(read)]
     verdicts = [_line_verdict(read.line)]
     if read.line.found:
         verdicts += _line_numbers(read)
@@ -83,6 +91,7 @@ def _line_verdict(line: LineReading) -> Verdict:
     if not line.found:
         return Verdict(
             "line on the ground", line.confidence, (0.5, 1.0), "FAIL", f"none: {line.reason}",
+            "look for two sides with --lane" if "other stripe" in line.reason else
             "point the camera at the ground; or say what the line is like: --polarity, --width, --contrast",
         )  # fmt: skip
     status: Status = "PASS" if line.confidence >= SURE else "WARN"
@@ -130,7 +139,7 @@ def _lane_verdict(read: Read) -> Verdict:
     if not lane.found:
         return Verdict("lane", None, None, "WARN", f"none: {lane.reason}")
     return Verdict(
-        "lane", lane.offset, None, "INFO",
+        "lane", lane.offset, None, "PASS",
         f"its middle, in lane widths, right is positive; it runs {_leaning(lane.heading_rad)}",
     )  # fmt: skip
 
@@ -141,7 +150,8 @@ def _video_verdicts(run: LineRun) -> list[Verdict]:
     status: Status = "PASS" if share >= MOSTLY else "WARN" if share >= OFTEN else "FAIL"
     verdicts = [
         Verdict(
-            "frames with a line", 100 * share, (100 * MOSTLY, 100.0), status,
+            "frames with a line or lane" if run.job.lane else "frames with a line",
+            100 * share, (100 * MOSTLY, 100.0), status,
             "seen all the way" if status == "PASS" else _why_lost(run),
             "" if status == "PASS" else "look at the frames without it in frames.csv", "%",
         )
@@ -155,7 +165,7 @@ def _video_verdicts(run: LineRun) -> list[Verdict]:
                 "slow down there, or let the camera look nearer" if longest > LOST_S else "", "s",
             )
         )  # fmt: skip
-    if found.any():
+    if any(one.line.found for one in run.reads):
         metric = [one.metres.offset_m for one in run.reads if one.metres is not None]
         offsets = np.array(metric or [one.line.offset for one in run.reads if one.line.found])
         verdicts.append(
@@ -177,15 +187,15 @@ def _video_verdicts(run: LineRun) -> list[Verdict]:
 
 def _why_lost(run: LineRun) -> str:
     """The reason most frames without a line give."""
-    reasons = [one.line.reason for one in run.reads if not one.line.found]
+    reasons = [one.line.reason for one, seen in zip(run.reads, run.found, strict=True) if not seen]
     return max(set(reasons), key=reasons.count)
 
 
 def _longest_gap(run: LineRun) -> tuple[float, float]:
     """How long (s) no line was seen at most, and from when on."""
     longest, begin, since = 0.0, 0.0, None
-    for one in run.reads:
-        if one.line.found:
+    for one, seen in zip(run.reads, run.found, strict=True):
+        if seen:
             since = None
             continue
         since = one.t_s if since is None else since
@@ -204,10 +214,10 @@ def _sections(run: LineRun) -> list[Section]:
             Section(
                 "The picture",
                 figure=lambda: figures.picture(run),
-                caption=FOUND if run.reads[0].line.found else NOT_FOUND,
+                caption=_caption(run.reads[0]),
             )
         )
-        if run.reads[0].line.parts:
+        if run.reads[0].line.parts and (run.reads[0].line.found or not has_lane(run.reads[0])):
             sections.append(_parts_section(run.reads[0].line))
     else:
         sections.append(
@@ -220,6 +230,13 @@ def _sections(run: LineRun) -> list[Section]:
     if run.left_out:
         sections.append(Section("Left out", table=Table(("frame",), tuple((one,) for one in run.left_out))))
     return sections
+
+
+def _caption(read: Read) -> str:
+    """How the picture is read."""
+    if read.line.found:
+        return FOUND
+    return LANE if has_lane(read) else NOT_FOUND
 
 
 MEANINGS = {

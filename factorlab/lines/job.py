@@ -23,7 +23,7 @@ from vision3d.lines import (
     read_scene,
 )
 
-__all__ = ["LineJob", "LineRun", "Read", "read_lines"]
+__all__ = ["LineJob", "LineRun", "Read", "has_lane", "read_lines"]
 
 Progress = Callable[[str, int, int], None]
 OnFrame = Callable[[Frame, "Read", float], None]
@@ -93,8 +93,8 @@ class LineRun:
 
     @property
     def found(self) -> NDArray[np.bool_]:
-        """Which frames (n,) show a line."""
-        return np.array([one.line.found for one in self.reads])
+        """Which frames (n,) show a line, or the lane that was asked for."""
+        return np.array([one.line.found or has_lane(one) for one in self.reads])
 
 
 def read_lines(
@@ -148,6 +148,11 @@ def read_lines(
             fault=frames.fault,
             left_out=frames.left_out,
         )
+
+
+def has_lane(read: Read) -> bool:
+    """Whether a lane was asked for and found."""
+    return read.lane is not None and read.lane.found
 
 
 def _read(frame: Frame, job: LineJob, ground: GroundHomography | None) -> Read:

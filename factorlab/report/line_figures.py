@@ -22,10 +22,11 @@ OFFSET, HEADING, LOST = "#0072B2", "#D55E00", "#bbbbbb"
 def picture(run: LineRun) -> Figure:
     """The only picture, with the line or the segments drawn in; the ground from above where it is known."""
     from factorlab.lines.files import bird_eye, drawn
+    from factorlab.lines.job import has_lane
     from vision3d.lines import draw_segments
 
     image, read = run.pictures[0], run.reads[0]
-    if read.line.found or run.scene is None:
+    if read.line.found or has_lane(read) or run.scene is None:
         shown = drawn(image, read)
     else:
         shown = draw_segments(image, run.scene.segments, run.scene.points)

@@ -62,13 +62,13 @@ def find_line(image: ArrayLike, settings: LineSettings | None = None) -> LineRea
     weights = [_confidence(parts) * stripe.salience for parts, stripe, _ in scored]
     best = int(np.argmax(weights))
     parts, stripe, curve = scored[best]
-    rivals = [
-        weight
+    rivals = {
+        round(2.0 * own_curve.bottom / stripe.width): weight
         for weight, (_, other, own_curve) in zip(weights, scored, strict=True)
         if abs(own_curve.bottom - curve.bottom) > 0.5 * max(stripe.width, other.width)
         and weight > RIVAL * weights[best]
-    ]
-    second = max(rivals, default=0.0) / max(weights[best], 1e-9)
+    }
+    second = max(rivals.values(), default=0.0) / max(weights[best], 1e-9)
     parts = parts | {"alone": float(np.clip((1.0 - second) / (1.0 - RIVAL), 0.0, 1.0))}
     stripe = sharpened(small, stripe)
     curve = refine_curve(stripe, rows - 1.0, middle, curve)
@@ -153,7 +153,7 @@ def _reading(
     weakest = min(parts, key=lambda name: parts[name])
     reason = REASONS[weakest] if parts[weakest] < 0.7 else ""
     if weakest == "alone" and reason:
-        reason = f"{rivals} other stripes look as much like a line"
+        reason = f"{rivals} other stripe{'s look' if rivals > 1 else ' looks'} as much like a line"
     if confidence < own.least_confidence:
         return no_line(reason or "nothing speaks for it clearly", confidence, parts)
     height, width = grey.shape

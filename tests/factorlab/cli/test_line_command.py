@@ -123,8 +123,14 @@ def test_a_lane(tmp_path):
     lines = [GroundLine(np.array([[-0.5, y], [6.0, y]]), 0.03, ink=0.9, floor=0.3) for y in (0.15, -0.15)]
     image = render_ground(CAMERA, CameraMount(0.25, 0.25), lines, np.zeros(3), rng=np.random.default_rng(1))
     cv2.imwrite(str(tmp_path / "lane.png"), image)
-    document = json.loads(run(tmp_path / "lane.png", "--lane", "--json").stdout)
+    alone = run(tmp_path / "lane.png", "--check")
+    assert alone.exit_code == 3
+    assert "1 other stripe looks as much like a line" in alone.stdout
+    done = run(tmp_path / "lane.png", "--lane", "--json", "--check")
+    assert done.exit_code == 0
+    document = json.loads(done.stdout)
     assert document["lane"]["found"]
+    assert document["conclusion"].startswith("A lane, its middle")
     assert abs(document["lane"]["offset"]) < 0.1
 
 
@@ -203,3 +209,15 @@ def test_reading_ends_when_asked_to_and_keeps_what_it_has(folder):
     )
     assert len(run.reads) == 5
     assert run.found.all()
+
+
+def test_frames_with_a_lane_count_where_one_is_asked_for(tmp_path):
+    lines = [GroundLine(np.array([[-0.5, y], [6.0, y]]), 0.03, ink=0.9, floor=0.3) for y in (0.15, -0.15)]
+    mount = CameraMount(0.25, 0.25)
+    images = [render_ground(CAMERA, mount, lines, np.array([0.1 * k, 0.0, 0.0])) for k in range(4)]
+    write_video(tmp_path / "road.avi", images, fps=10.0)
+    by_line = json.loads(run(tmp_path / "road.avi", "--json").stdout)
+    by_lane = json.loads(run(tmp_path / "road.avi", "--lane", "--json").stdout)
+    assert by_line["share_found"] < 0.5
+    assert by_lane["share_found"] == 1.0
+    assert by_lane["verdicts"][0]["metric"] == "frames with a line or lane"
