@@ -138,7 +138,7 @@ def _agreement(done: CalibratedCamera) -> Verdict:
     if times <= 1.0 and not remarks:
         meaning = "they scatter no more than independent corners do"
         return Verdict("pictures against each other", times, None, "PASS", meaning, unit="σ")
-    meaning = "; ".join((*remarks, "every σ told here takes that in"))
+    meaning = "; ".join((*remarks, *(["every σ told here takes that in"] if times > 1.0 else [])))
     status: Status = "INFO" if times < SCATTERED else "WARN"
     action = (
         "" if times < SCATTERED else "one camera, focus and zoom fixed? A flat board? The right lens model?"
