@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 __all__ = ["camera"]
 
-KINDS = ("checkerboard", "charuco", "circles", "acircles")
+KINDS = ("checkerboard", "charuco", "circles", "acircles", "markers")
 LENSES = ("auto", "pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "thin12", "fisheye4")
 
 
 OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.argument("sources", metavar="IMAGES…", nargs=-1, required=True),
     click.option("--board", "board_text", metavar="COLSxROWS", required=True,
-                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles."),
+                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles, markers."),
     click.option("--square", metavar="LENGTH", required=True,
-                 help="Side of a square, or distance of circles: 25mm, 2.5cm, 0.025m."),
+                 help="Side of a square or of a marker, or distance of circles: 25mm, 2.5cm, 0.025m."),
     click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
                  help="What is on the board."),
     click.option("--marker", metavar="LENGTH",
-                 help="Side of the markers of a ChArUco board: 18mm.  [default: 0.75 of the square]"),
+                 help="Markers of a ChArUco board: 18mm, 0.75 squares by default; gap of markers."),
     click.option("--dictionary", metavar="NAME", help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
     click.option("--lens", type=click.Choice(LENSES), default="auto", show_default=True,
                  help="Lens model; auto takes the one that predicts pictures best that it has not seen."),
@@ -103,10 +103,10 @@ def _settings(options: dict[str, Any]) -> CameraSettings:
     from sequential.errors import FactorlabError
     from vision3d.boards import board_from_text
 
-    if options["kind"] != "charuco":
+    if options["kind"] not in ("charuco", "markers"):
         for name in ("marker", "dictionary"):
             if options[name] is not None:
-                raise click.UsageError(f"--{name} goes with --kind charuco")
+                raise click.UsageError(f"--{name} goes with --kind charuco or markers")
     try:
         board = board_from_text(
             options["board_text"], kind=options["kind"], square=options["square"],

@@ -9,13 +9,17 @@ from camera_photos import OPTIONS, TRUTH, answer, photographed, run
 
 from factorlab.camera import held_pictures, open_pictures
 from sequential.errors import DataError
-from vision3d.boards import CharucoBoard, CircleGrid
+from vision3d.boards import CharucoBoard, CircleGrid, MarkerBoard
 
 CHARUCO = ("--board", "8x6", "--kind", "charuco", "--square", "30mm", "--marker", "22mm")
 BOARDS = {
     "charuco": (CharucoBoard(8, 6, 0.030, 0.022), CHARUCO),
     "legacy": (CharucoBoard(8, 6, 0.030, 0.022, legacy=True), CHARUCO),
     "circles": (CircleGrid(9, 7, 0.030), ("--board", "9x7", "--kind", "circles", "--square", "30mm")),
+    "markers": (
+        MarkerBoard.grid(5, 4, 0.035, 0.010, "4x4_50"),
+        ("--board", "5x4", "--kind", "markers", "--square", "35mm", "--marker", "10mm"),
+    ),
     "acircles": (
         CircleGrid(4, 11, 0.020, asymmetric=True),
         ("--board", "4x11", "--kind", "acircles", "--square", "20mm"),
