@@ -30,8 +30,8 @@ NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def course(t):
-    """Un marqueur de 18 px, à 1,45 m, qui se balance autour d'une inclinaison de 14°."""
-    base = np.array([1.0, 0.0, 0.0, 0.0, 0.12, -0.06, 1.45])
+    """Un marqueur de 20 px, à 1,3 m, qui se balance autour d'une inclinaison de 14°."""
+    base = np.array([1.0, 0.0, 0.0, 0.0, 0.12, -0.06, 1.3])
     turn = np.array([0.24 + 0.2 * np.sin(1.9 * t), 0.2 * np.sin(2.6 * t + 1.0), 0.3 * np.sin(0.8 * t)])
     return SE3().retract(base, np.concatenate([turn, 0.02 * np.sin([1.1 * t, 0.7 * t, 0.5 * t])]))
 
@@ -39,7 +39,7 @@ def course(t):
 def photograph(pose, rng):
     """Une webcam ordinaire : flou et bruit."""
     plane = Plane(pose, marker_texture(DICTIONARY, NUMBER, SIZE_M))
-    return render_planes(CAMERA, [plane], rng=rng, noise=6.0, blur_px=0.9)
+    return render_planes(CAMERA, [plane], rng=rng, noise=5.0, blur_px=0.8)
 
 
 def usual_pose(image):
@@ -127,7 +127,7 @@ def draw_marker(axes, image, pose):
     colours = (figures.ORANGE, figures.GREEN, figures.SKY)
     for k, (colour, name) in enumerate(zip(colours, ("x", "y", "normale"), strict=True), start=1):
         axes.plot(x[[0, k]], y[[0, k]], color=colour, linewidth=2.5, label=name)
-    axes.set(xlim=(x[0] - 30, x[0] + 30), ylim=(y[0] + 26, y[0] - 26), title="Le marqueur, 18 pixels de côté")
+    axes.set(xlim=(x[0] - 30, x[0] + 30), ylim=(y[0] + 26, y[0] - 26), title="Le marqueur, 20 pixels de côté")
     axes.axis("off")
     axes.legend(loc="lower right", facecolor="white", frameon=True)
 

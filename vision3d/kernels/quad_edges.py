@@ -290,7 +290,7 @@ def refine_quads(image, quads, bends, cells, noise, reach_px, corners, covs, ref
             for k in range(4):
                 start[k, 0], start[k, 1] = corners[m, k, 0], corners[m, k, 1]
                 blurs = cell[k] / blur_of(halves[k], responses[k])  # what lies beyond the next edge shines in
-                floors[k] = noise[0] + 0.12 * math.exp(2.2 - blurs)
+                floors[k] = noise[0] + 0.2 * math.exp(2.2 - blurs)
                 if turn == 0:
                     halves[k] = min(widest[k], USUAL_PX)
                 elif responses[k] < 0.75:

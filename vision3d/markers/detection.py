@@ -32,8 +32,9 @@ __all__ = ["Marker", "bends_of", "detect_markers", "find_markers"]
 
 Array = NDArray[np.float64]
 
-SYSTEMATIC_PX = 0.012  # what is left of an edge's position with neither noise nor blur: 8 bits, sampling
+SYSTEMATIC_PX = 0.02  # what is left of an edge's position with neither noise nor blur: 8 bits, sampling
 CORRELATION = 1.5  # neighbouring profiles share pixels: a line is worth fewer of them
+BLOOM_PX = 0.1  # by which light, ink and gamma move all four sides of a marker together, in or out
 UNREFINED_PX = 0.5  # corners as OpenCV's contours give them
 REACH_PX = 2.5
 CURVATURE_PX = 2e-4  # half the curvature (1/px) that a lens without a name may give to a straight side
@@ -160,6 +161,13 @@ def _squares(grey: NDArray[np.uint8], name: str) -> tuple[Array, NDArray[np.int6
     return np.ascontiguousarray(_grown(found.corners[order])), found.ids[order]
 
 
+def _outward(quads: Array) -> Array:
+    """Covariance (M, 8, 8) of corners (M, 4, 2) whose sides all move outward by one pixel, one sigma."""
+    step = (_grown(quads) - quads).reshape(-1, 8) / INWARD_PX
+    together: Array = step[:, :, None] * step[:, None, :]
+    return together
+
+
 def _grown(quads: Array) -> Array:
     """Move the sides of quadrilaterals (M, 4, 2) outward by INWARD_PX."""
     ahead = np.roll(quads, -1, axis=1) - quads
@@ -203,6 +211,7 @@ def _refined(
     noise = np.array([SYSTEMATIC_PX, CORRELATION, CURVATURE_PX if camera is None else 0.1 * CURVATURE_PX])
     bends = np.zeros(quads.shape[:2]) if camera is None else bends_of(camera, quads)
     refine_quads(grey, quads, bends, cells, noise, REACH_PX, corners, covs, done)
+    covs += BLOOM_PX**2 * _outward(corners)
     covs[~done] = np.eye(8) * UNREFINED_PX**2
     sigmas = np.sqrt(np.diagonal(covs, axis1=1, axis2=2).reshape(-1, 4, 2).mean(axis=2))
     return tuple(

@@ -85,4 +85,4 @@ def test_corners_meet_rendered_truth_with_an_honest_covariance(side_px, known, r
         errors.append(error)
         nees.append(error @ np.linalg.solve(marker.cov_px2, error) / 8.0)
     assert np.sqrt(np.mean(np.square(errors))) < 0.04
-    assert 0.2 < np.mean(nees) < 1.6
+    assert 0.05 < np.mean(nees) < 1.5  # allows for ink, light and gamma, which the rendering has not
