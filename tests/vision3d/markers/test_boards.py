@@ -9,7 +9,15 @@ from sequential.errors import DataError
 from sequential.manifold import SE3
 from vision3d.boards import CharucoBoard, MarkerBoard
 from vision3d.camera import Camera
-from vision3d.markers import Marker, board_pose, find_board_pose, marker_board_pose, marker_pose
+from vision3d.camera_files import read_camera
+from vision3d.markers import (
+    Marker,
+    board_pose,
+    detect_markers,
+    find_board_pose,
+    marker_board_pose,
+    marker_pose,
+)
 from vision3d.pose import project_object
 from vision3d.render import board_planes, render_planes
 from vision3d.views import View
@@ -113,3 +121,29 @@ def test_the_tutorial_board_has_24_corners_and_16_behind_the_hand(data_dir):
         (view,) = detect_views([(name, picture)], board).views
         counts.append(len(view))
     assert counts == [24, 16]
+
+
+def test_real_markers_agree_with_the_board_that_they_stand_on(data_dir):
+    """Every marker of the tutorial's boards alone, 21-31 px wide, held to the pose of all corners."""
+    folder = data_dir / "vision/aruco"
+    board = CharucoBoard(5, 7, 0.04, 0.02, "6x6_250", legacy=True)
+    whole = board.opencv()
+    places = dict(zip(np.ravel(whole.getIds()).tolist(), map(np.asarray, whole.getObjPoints()), strict=True))
+    certain, wrong, nees = [], [], []
+    for name in ("choriginal.jpg", "chocclusion_original.jpg"):
+        picture = cv2.imread(str(folder / name), cv2.IMREAD_GRAYSCALE)
+        camera = read_camera(folder / "tutorial_camera_charuco.yml", size=picture.shape[::-1])
+        board_now = find_board_pose(camera, board, picture).camera_T_board
+        for marker in detect_markers(picture, "6x6_250", camera=camera):
+            corners = np.asarray(places[marker.id], dtype=np.float64)
+            assert np.allclose(corners[1] - corners[0], [0.02, 0.0, 0.0], atol=1e-6)  # parallel to the board
+            truth = SE.retract(board_now, np.r_[0.0, 0.0, 0.0, corners.mean(axis=0)])
+            pose = marker_pose(camera, marker.corners, 0.02, marker.cov)
+            steps = [SE.local(mode.camera_T_marker, truth)[:3] for mode in pose.modes]
+            certain.append(pose.certain)
+            wrong.append(np.linalg.norm(steps[0]) > np.radians(10.0))
+            nees.append(steps[0] @ np.linalg.solve(pose.cov[:3, :3], steps[0]) / 3.0)
+    assert len(certain) == 30
+    assert not any(wrong)
+    assert sum(certain) >= 26
+    assert np.median(nees) < 1.6
