@@ -31,7 +31,7 @@ class Curve:
     rms : of the residuals, px
     coverage : share of the rows between bottom and middle in which the stripe was seen whole
     width_spread : how far the widths depart from a straight line in y, as a share of the width
-    criterion : Schwarz's, the smaller the better
+    criterion : Akaike's, the smaller the better
     """
 
     bottom: float
@@ -72,7 +72,7 @@ def fit_curve(stripe: Stripe, bottom: float, middle: float, degree: int = 3) -> 
 
 
 def refine_curve(stripe: Stripe, bottom: float, middle: float, first: Curve) -> Curve:
-    """The polynomial of the degree that the rows speak for, by Schwarz's criterion.
+    """The polynomial of the degree that the rows speak for, by Akaike's criterion.
 
     Where the lowest or the highest rows are missing no more than a cubic is carried on to them.
     """

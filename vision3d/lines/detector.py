@@ -70,7 +70,7 @@ def find_line(image: ArrayLike, settings: LineSettings | None = None) -> LineRea
     }
     second = max(rivals.values(), default=0.0) / max(weights[best], 1e-9)
     parts = parts | {"alone": float(np.clip((1.0 - second) / (1.0 - RIVAL), 0.0, 1.0))}
-    stripe = sharpened(small, stripe)
+    stripe = sharpened(small, stripe)  # its width and contrast stay as they were judged
     curve = refine_curve(stripe, rows - 1.0, middle, curve)
     return _reading(grey, own, factor, top, stripe, curve, parts, len(rivals))
 

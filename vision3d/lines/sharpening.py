@@ -18,6 +18,7 @@ __all__ = ["sharpened"]
 Array = NDArray[np.float64]
 REACH = 4.0  # px from the edge, at which a side's own level is taken; less in a narrow stripe
 ROUNDS = 2
+KEPT = 0.5  # of the rows, that must show both edges
 FARTHEST = 2.5  # px that an edge may move
 
 
@@ -35,6 +36,8 @@ def sharpened(small: NDArray[np.uint8], stripe: Stripe) -> Stripe:
             moved = _half_way(smooth, y, moved, outward * reach)
         moved[np.abs(moved - edges[y]) > FARTHEST] = np.nan
         edges[y] = moved
+    if not np.isfinite(left[y] + right[y]).sum() > KEPT * len(y):
+        return stripe  # no edge stands where the threshold saw one: a faint stripe on a rough ground
     lost = np.isnan(left) | np.isnan(right)
     left[lost] = right[lost] = np.nan
     return replace(stripe, left=left, right=right)

@@ -128,6 +128,19 @@ def test_where_there_is_none_none_is_found(kind, threshold, rng):
     assert np.isnan(reading.offset)
 
 
+def test_stains_of_any_size_are_read_without_a_fault(rng):
+    for size in np.repeat([5, 12, 30, 80, 200], 4):
+        coarse = rng.normal(120, rng.uniform(10, 60), (480 // size + 3, 640 // size + 3)).astype(np.float32)
+        image = cv2.resize(coarse, (640, 480), interpolation=cv2.INTER_CUBIC) + rng.normal(0, 3, (480, 640))
+        for settings in (
+            LineSettings(),
+            LineSettings(contrast=0.03, width=(0.005, 1.0), least_confidence=0.0),
+        ):
+            reading = find_line(np.clip(image, 0, 255).astype(np.uint8), settings)
+            assert 0.0 <= reading.confidence <= 1.0
+            assert np.isfinite(reading.offset) == reading.found
+
+
 def test_photographs_without_a_line_have_none(data_dir):
     paths = sorted((data_dir / "vision").glob("*/*.[jp][pn]g"))
     assert len(paths) > 40
