@@ -17,7 +17,7 @@ HUBER = 1.5
 FLOOR = 0.02  # px that a row is never better known than
 BIAS = (0.02, 0.007)  # px, of what repeats from row to row: at the curve's end, and within it
 GAP_ROWS = 6
-HIGHEST = 6
+CUBIC, HIGHEST = 3, 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,9 +78,8 @@ def refine_curve(stripe: Stripe, bottom: float, middle: float, first: Curve) -> 
     """
     seen = np.flatnonzero(np.isfinite(stripe.left) & ~stripe.cut_off)
     cut_short = seen[-1] < bottom - GAP_ROWS or seen[0] > middle
-    curves = [
-        fit_curve(stripe, bottom, middle, degree) for degree in (1, 2, 3, 4, 5, 6)[: 3 if cut_short else 6]
-    ]
+    degrees = range(1, CUBIC + 1 if cut_short else HIGHEST + 1)
+    curves = [fit_curve(stripe, bottom, middle, degree) for degree in degrees]
     return min((one for one in curves if one is not None), key=lambda one: one.criterion, default=first)
 
 
