@@ -15,7 +15,8 @@ PACKAGES := chromium gcc g++ make \
 	/usr/include/libelf.h:libelf-dev /usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h:arduino-core-avr \
 	cppcheck clang /usr/lib/llvm-*/lib/clang/*/include/fuzzer:libclang-rt-dev
 # what looks at images
-VISION_TESTS := tests/vision3d tests/test_image_conventions.py
+VISION_TESTS := tests/vision3d tests/test_image_conventions.py tests/factorlab/camera tests/factorlab/markers tests/factorlab/live \
+	tests/factorlab/cli/test_sheet.py $(patsubst %,tests/factorlab/cli/test_%_command.py,camera line live objects undistort)
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
@@ -45,7 +46,7 @@ test: packages $(VENV)/installed-test warm
 # OpenCV 4 lies beside the environment's OpenCV 5: what touches images runs on both
 test-opencv4: $(VENV)/installed-test warm
 	@[ -d $(VENV)/opencv4/cv2 ] || { $(call pip_install,--no-deps --target $(VENV)/opencv4 'opencv-python-headless==4.14.*'); }
-	@PYTHONPATH=$(VENV)/opencv4 $(ONE_THREAD) $(BIN)/python -m pytest -n 2 $(VISION_TESTS)
+	@PYTHONPATH=$(CURDIR)/$(VENV)/opencv4 $(ONE_THREAD) $(BIN)/python -m pytest -n 2 $(VISION_TESTS)
 
 packages:
 	@.ci/debian-packages $(PACKAGES)
