@@ -91,7 +91,7 @@ def rendered_figures(count: int) -> dict[str, Figure]:
             min(first.values()), "", begun, 0.75 if enough else None, None, "higher"
         ),
         "rendered_projection_z": Figure(projection, "", "RMS of error / σ over a 10x10 grid"),
-        "rendered_corner_error": Figure(corner, "px", "RMS of a coordinate; cornerSubPix 5x5 0.030 (detection.py)"),
+        "rendered_corner_error": Figure(corner, "px", "RMS of a coordinate; cornerSubPix 5x5 0.030"),
         "rendered_corner_z": Figure(corner_z, "", "RMS of error / σ of a corner"),
         "rendered_views_found": Figure(found, "views", f"of {total}", total, None, "higher"),
     }
