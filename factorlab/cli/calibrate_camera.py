@@ -11,7 +11,7 @@ import click
 
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.progress import bar
-from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
+from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option, with_options
 
 if TYPE_CHECKING:
     from factorlab.camera import CameraSettings
@@ -57,9 +57,7 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
 
 def camera_options(command: Command) -> Command:
     """Argument and options of the command."""
-    for option in reversed(OPTIONS):
-        command = option(command)
-    return command
+    return with_options(command, OPTIONS)
 
 
 @click.command(short_help="Camera, from pictures of a checkerboard, ChArUco or circles.")

@@ -11,7 +11,7 @@ import click
 from factorlab.cli.delivery import header_option, require_output
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.recording import opened, recording_options
-from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
+from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option, with_options
 
 if TYPE_CHECKING:
     from factorlab.report.document import Document
@@ -39,9 +39,7 @@ more_than_zero = click.FloatRange(min=0, min_open=True)
 
 def delivery_options(command: Command) -> Command:
     """The options that the three commands have in common."""
-    for option in reversed(OPTIONS):
-        command = option(command)
-    return command
+    return with_options(command, OPTIONS)
 
 
 @click.command(short_help="Magnetometer, from turns in every direction.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import in_one_sentence
-from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option
+from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option, with_options
 
 if TYPE_CHECKING:
     from factorlab.lines import LineJob
@@ -55,9 +55,7 @@ OPTIONS = (
 
 def line_options(command: Command) -> Command:
     """Argument and options of the command."""
-    for option in reversed(OPTIONS):
-        command = option(command)
-    return command
+    return with_options(command, OPTIONS)
 
 
 @click.command(short_help="The line that a robot follows, in pictures and videos.")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factorlab.cli.settings import Command
+from factorlab.cli.settings import Command, with_options
 
 if TYPE_CHECKING:
     from factorlab.datasets.recordings import OpenedRecording
@@ -29,9 +29,7 @@ OPTIONS = (
 
 def recording_options(command: Command) -> Command:
     """Give a command `--kind`, `--units`, `--columns` and `--rate`, for `opened`."""
-    for option in reversed(OPTIONS):
-        command = option(command)
-    return command
+    return with_options(command, OPTIONS)
 
 
 def opened(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ __all__ = [
     "print_json",
     "robot_option",
     "seed_option",
+    "with_options",
 ]
 
 Command = Callable[..., Any]
@@ -37,6 +38,13 @@ max_gap_option = click.option(
     metavar="S",
     help="Longest pause of the input to bridge, s.",
 )
+
+
+def with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
+    """Give a command arguments and options, in the order in which its help lists them."""
+    for option in reversed(options):
+        command = option(command)
+    return command
 
 
 def config_option(command: Command) -> Command:

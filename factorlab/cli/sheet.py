@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import in_one_sentence
-from factorlab.cli.settings import as_json, config_option, print_json
+from factorlab.cli.settings import Command, as_json, config_option, print_json, with_options
 
 if TYPE_CHECKING:
     from vision3d.boards import Board
     from vision3d.sheets import Page
 
 __all__ = ["sheet"]
-
-Command = Callable[..., Any]
 
 
 @click.group(short_help="Boards and markers to print, true to size.")
@@ -52,9 +50,7 @@ def sheet_options(command: Command) -> Command:
         config_option,
         in_one_sentence,
     )
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 def board_options(default: str, counted: str, side: str) -> Callable[[Command], Command]:
@@ -109,9 +105,7 @@ def marker_options(command: Command) -> Command:
         click.option("--gap", metavar="LENGTH", help="White between them.  [default: a quarter of the size]"),
         click.option("--board", metavar="COLSxROWS", help="One board of markers instead of single ones."),
     )
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(command, options)
 
 
 @sheet.command(short_help="ArUco markers, or a board of them.")

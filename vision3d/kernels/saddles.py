@@ -46,10 +46,9 @@ def _model(q, b1, b2, x, y, row):
     a, b = q[6] * f1 * e2, q[6] * e1 * f2
     row[0] = -((a * d1u + b * d2u) * light + flat * q[7])
     row[1] = -((a * d1v + b * d2v) * light + flat * q[8])
-    n1, n2 = v * c1 - u * s1, v * c2 - u * s2
     # turning the normal by da moves d by t and t by -(u c + v s)
-    row[2] = a * (n1 - b1 * t1 * (u * c1 + v * s1)) * light
-    row[3] = b * (n2 - b2 * t2 * (u * c2 + v * s2)) * light
+    row[2] = a * (t1 - b1 * t1 * (u * c1 + v * s1)) * light
+    row[3] = b * (t2 - b2 * t2 * (u * c2 + v * s2)) * light
     row[4] = -(a * d1 + b * d2) / s * light
     row[5] = light
     row[6] = e1 * e2 * light

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError
-from sequential.manifold.quaternion import quaternion_from_matrix, quaternion_multiply, rotate
+from sequential.manifold.quaternion import quaternion_from_matrix
 from vision3d.boards import (
     DICTIONARIES,
     Board,
@@ -22,6 +22,7 @@ from vision3d.boards import (
 )
 from vision3d.render.scene import Plane
 from vision3d.render.texture import DARK, LIGHT, PAPER, Texture, cells
+from vision3d.rigid import compose
 
 __all__ = [
     "board_planes",
@@ -58,9 +59,7 @@ def board_planes(board: Board, camera_T_board: NDArray[np.float64]) -> list[Plan
         size = float(np.linalg.norm(across))
         x, y = across / size, down / np.linalg.norm(down)
         own = quaternion_from_matrix(np.column_stack([x, y, np.cross(x, y)]))
-        attitude = quaternion_multiply(camera_T_board[:4], own)
-        place = rotate(camera_T_board[:4], corners.mean(axis=0)) + camera_T_board[4:]
-        pose = np.concatenate([attitude, place])
+        pose = compose(camera_T_board, np.concatenate([own, corners.mean(axis=0)]))
         planes.append(Plane(pose, marker_texture(board.dictionary, int(number), size)))
     return planes
 

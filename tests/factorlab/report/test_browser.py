@@ -5,22 +5,10 @@ import re
 import subprocess
 
 import pytest
+from chromium import QUIET
 
 from factorlab.compare import compare, document
 from factorlab.report import write_report
-
-QUIET = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-)
-
 
 NOBODY = "not an origin"
 
