@@ -8,11 +8,11 @@ the file in which a function stands.
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from pathlib import Path
 
 import numba
+
+from sequential.cache_place import cache_place
 
 __all__ = ["cache_folder"]
 
@@ -54,23 +54,17 @@ ROOMS = ("models/*.py", "attitude/*_kernel.py", "attitude/*_layout.py", "sensors
 
 def cache_folder() -> Path:
     """Where compiled code is kept: NUMBA_CACHE_DIR, else the user's cache, else the temporary folder."""
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(given)
+    return cache_place(lambda: f"kernels-{digest()}")
+
+
+def digest() -> str:
+    """A name for the text of what is inlined into others, and for Numba."""
     package = Path(__file__).parent.parent
-    digest = hashlib.sha256(numba.__version__.encode())
+    told = hashlib.sha256(numba.__version__.encode())
     rooms = [path for pattern in ROOMS for path in sorted(package.glob(pattern))]
     for source in [*(package / name for name in INLINED), *rooms]:
-        digest.update(source.read_bytes() if source.exists() else b"")
-    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    for folder in (base, Path(tempfile.gettempdir())):
-        cache = folder / "factorlab" / f"kernels-{digest.hexdigest()[:16]}"
-        try:
-            cache.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(cache, os.W_OK):
-            return cache
-    return Path(tempfile.mkdtemp(prefix="factorlab-kernels-"))
+        told.update(source.read_bytes() if source.exists() else b"")
+    return told.hexdigest()[:16]
 
 
 numba.config.CACHE_DIR = str(cache_folder())

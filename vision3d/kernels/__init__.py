@@ -8,9 +8,7 @@ looks only at the file in which a function stands.
 from __future__ import annotations
 
 import hashlib
-import os
 import re
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -18,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
+
+from sequential.cache_place import cache_place
 
 __all__ = ["cache_folder", "inlined", "kernel"]
 
@@ -42,18 +42,7 @@ def inlined(function: Any) -> Any:
 
 def cache_folder() -> Path:
     """Where compiled code is kept: NUMBA_CACHE_DIR, else the user's cache, else the temporary folder."""
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(given)
-    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    for folder in (base, Path(tempfile.gettempdir())):
-        place = folder / "factorlab" / f"vision-{digest(Path(__file__).parent)}"
-        try:
-            place.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(place, os.W_OK):
-            return place
-    return Path(tempfile.mkdtemp(prefix="factorlab-vision-"))
+    return cache_place(lambda: f"vision-{digest(Path(__file__).parent)}")
 
 
 def digest(room: Path) -> str:
