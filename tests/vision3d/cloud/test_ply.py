@@ -9,6 +9,7 @@ from sequential.errors import DataError, FileFormatError, ShapeError
 from vision3d.cloud import read_ply, write_ply
 from vision3d.cloud.with_open3d import open3d
 
+XYZ = b"property float x\nproperty float y\nproperty float z\n"
 POINTS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.5], [0.0, 1.0, 2.0], [1.0, 1.0, -0.25]])
 
 
@@ -85,20 +86,8 @@ def test_big_endian_with_uneven_polygons_is_read(tmp_path):
         (b"ply\nformat ascii 1.0\nelement vertex many\nend_header\n", "is not understood"),
         (b"ply\nformat middle_endian 1.0\nelement vertex 0\nend_header\n", "is not known"),
         (b"ply\nformat ascii 1.0\nelement face 0\nend_header\n", "holds no points"),
-        (
-            (
-                b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
-                b"end_header\n0 0 0\n1 0\n"
-            ),
-            "vertex 2 of 2",
-        ),
-        (
-            (
-                b"ply\nformat binary_little_endian 1.0\nelement vertex 9\nproperty float x\nproperty float y\n"
-                b"property float z\nend_header\n0000"
-            ),
-            "cut off",
-        ),
+        (b"ply\nformat ascii 1.0\nelement vertex 2\n" + XYZ + b"end_header\n0 0 0\n1 0\n", "vertex 2 of 2"),
+        (b"ply\nformat binary_little_endian 1.0\nelement vertex 9\n" + XYZ + b"end_header\n0000", "cut off"),
     ],
 )
 def test_a_broken_file_is_told(tmp_path, content, said):
