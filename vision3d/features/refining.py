@@ -1,0 +1,163 @@
+"""Sub-pixel matches: the patch about a point of one image, aligned with the other image.
+
+A detector finds a point in each image by itself, and errs in each; a match asks only where the same light
+lies.  Aligning patches leaves one error instead of two, and a much smaller one, with a covariance from what
+the fit leaves.  The first point stays; the second moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sequential.errors import ModelError, ShapeError
+from vision3d.features.features import Array
+
+__all__ = ["refine_matches"]
+
+INFLATION = 6.0  # both images are smoothed, so that their noise is correlated
+BLUR_PX = 0.7  # interpolation is exact only for what is smooth
+ITERATIONS = 30
+
+
+def refine_matches(
+    image_a: ArrayLike,
+    image_b: ArrayLike,
+    pixels_a: ArrayLike,
+    pixels_b: ArrayLike,
+    *,
+    warps: ArrayLike | None = None,
+    affine: bool = True,
+    radius_px: int = 9,
+    levels: int = 2,
+    reach_px: float = 3.0,
+    min_correlation: float = 0.8,
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Move the second point of every match to where the patch about the first lies.
+
+    Parameters
+    ----------
+    image_a, image_b : (h, w) grey levels or (h, w, 3) BGR, uint8; sizes and lights may differ
+    pixels_a, pixels_b : (M, 2) px
+    warps : (M, 2, 2) d pixels_b / d pixels_a near each match, such as `matches.warps(a, b)`, or the Jacobian
+        of a homography; None: neither turned nor scaled
+    affine : refine the warp as well; otherwise only shift, gain and offset of the light
+    radius_px : half the side of the window, px of the coarser of both images
+    levels : of the pyramid, coarsest first; what fails on one is tried on the next
+    reach_px : farthest that a point may move on the coarsest level, px of it
+    min_correlation : of both patches after the fit, 0 to 1
+
+    Returns
+    -------
+    pixels_b : (M, 2) px; as given where it failed
+    cov : (M, 2, 2) px², of the second point given the first; NaN where it failed
+    ok : (M,) whether the patch was found: inside both images, near, alike, and with light and shade in both
+        directions
+
+    Raises
+    ------
+    ShapeError
+        where the arrays do not belong together.
+    ModelError
+        where a setting has no meaning.
+    """
+    from vision3d.features.detection import grey_bytes
+
+    if radius_px < 2 or levels < 1 or reach_px <= 0 or not 0.0 <= min_correlation < 1.0:
+        raise ModelError(
+            "expected radius_px >= 2, levels >= 1, reach_px > 0 and min_correlation from 0 to 1; got "
+            f"{radius_px}, {levels}, {reach_px}, {min_correlation}"
+        )
+    a, b = (_points(one, name) for one, name in ((pixels_a, "pixels_a"), (pixels_b, "pixels_b")))
+    if len(a) != len(b):
+        raise ShapeError(
+            f"matches are pairs; got {len(a)} points of the first image and {len(b)} of the second"
+        )
+    given = np.broadcast_to(np.eye(2), (len(a), 2, 2)) if warps is None else np.asarray(warps, np.float64)
+    if given.shape != (len(a), 2, 2):
+        raise ShapeError(f"warps of {len(a)} matches are ({len(a)}, 2, 2), got {given.shape}")
+    given = given.copy()
+    found = _Found(a, b.copy(), given, np.full((len(a), 2, 2), np.nan), np.zeros(len(a), np.bool_))
+    window = _Window(radius_px, affine, reach_px, min_correlation)
+    first, second = _Pyramid(grey_bytes(image_a)), _Pyramid(grey_bytes(image_b))
+    for level in range(levels - 1, -1, -1):
+        _level(first, second, level, found, window)
+    return found.b, found.cov, found.ok
+
+
+@dataclass(slots=True)
+class _Found:
+    """What is known of every match so far; levels write into it where they succeed."""
+
+    a: Array
+    b: Array
+    warp: Array
+    cov: Array
+    ok: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """How patches are compared."""
+
+    radius: int
+    affine: bool
+    reach: float
+    least: float
+
+
+def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window: _Window) -> None:
+    """One level of the pyramids; patches of like scales together."""
+    from vision3d.kernels.patch_alignment import align
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = np.log2(np.sqrt(np.abs(np.linalg.det(found.warp))))
+    octaves = np.where(np.isfinite(scale), np.clip(np.rint(scale), -8, 8), 0).astype(int)
+    finite = np.isfinite(found.a).all(axis=1) & np.isfinite(found.b).all(axis=1) & np.isfinite(scale)
+    for octave in np.unique(octaves):
+        image_a, image_b = first.at(level + max(0, -octave)), second.at(level + max(0, octave))
+        if image_a is None or image_b is None:
+            continue
+        rows = np.flatnonzero((octaves == octave) & finite)
+        own_a, own_b = 2.0 ** (level + max(0, -octave)), 2.0 ** (level + max(0, octave))
+        place = np.ascontiguousarray(found.b[rows] / own_b)
+        turned = np.ascontiguousarray(found.warp[rows] * (own_a / own_b))
+        covs, facts = np.empty((len(rows), 3)), np.empty((len(rows), 4))
+        align(
+            image_a, image_b, np.ascontiguousarray(found.a[rows] / own_a), place, turned, window.radius,
+            window.affine, ITERATIONS, window.reach, covs, facts,
+        )  # fmt: skip
+        good = (facts[:, 0] >= window.least) & np.isfinite(covs).all(axis=1)
+        done = rows[good]
+        found.b[done], found.warp[done] = place[good] * own_b, turned[good] * (own_b / own_a)
+        found.cov[done] = INFLATION * own_b**2 * covs[good][:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+        found.ok[done] = True
+
+
+class _Pyramid:
+    """Halved again and again; pixel (x, y) of the image is (x, y) / 2^k of level k."""
+
+    def __init__(self, image: NDArray[np.uint8]) -> None:
+        import cv2
+
+        smooth = cv2.GaussianBlur(image.astype(np.float32), (0, 0), BLUR_PX)
+        self._levels = [np.asarray(smooth, np.float32)]
+
+    def at(self, level: int) -> NDArray[np.float32] | None:
+        """A level; None where it would be too small to hold a patch."""
+        import cv2
+
+        while len(self._levels) <= level:
+            if min(self._levels[-1].shape) < 2:
+                return None
+            self._levels.append(np.ascontiguousarray(cv2.pyrDown(self._levels[-1])))
+        return self._levels[level]
+
+
+def _points(values: ArrayLike, name: str) -> Array:
+    points = np.asarray(values, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ShapeError(f"{name} are (M, 2), got shape {points.shape}")
+    return points

@@ -1,0 +1,47 @@
+"""Features over the whole image instead of a heap on its most textured corner."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sequential.errors import ShapeError
+
+__all__ = ["spread_rows"]
+
+PER_CELL = 8  # features a cell would hold if all cells had as many
+
+
+def spread_rows(
+    pixels: ArrayLike, response: ArrayLike, size: tuple[int, int], count: int
+) -> NDArray[np.int64]:
+    """Choose features cell by cell: the strongest of every cell first, then every second, until enough.
+
+    Parameters
+    ----------
+    pixels : (N, 2) px
+    response : (N,) strength; larger is better
+    size : (width, height) of the image, px
+    count : how many to keep
+
+    Returns
+    -------
+    NDArray[np.int64]
+        (min(N, count),) rows, strongest first.
+    """
+    at, strong = np.asarray(pixels, dtype=np.float64), np.asarray(response, dtype=np.float64)
+    if at.ndim != 2 or at.shape[1] != 2 or strong.shape != (len(at),):
+        raise ShapeError(f"expected pixels (N, 2) with a response each, got {at.shape} and {strong.shape}")
+    order = np.argsort(-strong, kind="stable")
+    if len(at) <= count:
+        return order
+    side = math.sqrt(size[0] * size[1] / max(1.0, count / PER_CELL))
+    columns = math.ceil(size[0] / side)
+    cell = (at[:, 1] // side).astype(np.int64) * columns + (at[:, 0] // side).astype(np.int64)
+    grouped = order[np.argsort(cell[order], kind="stable")]  # cell by cell, strongest first within each
+    starts = np.flatnonzero(np.r_[True, np.diff(cell[grouped]) != 0])
+    turn = np.arange(len(grouped)) - np.repeat(starts, np.diff(np.r_[starts, len(grouped)]))
+    chosen = grouped[np.lexsort((-strong[grouped], turn))[:count]]
+    return np.asarray(chosen[np.argsort(-strong[chosen], kind="stable")], dtype=np.int64)
