@@ -1,9 +1,31 @@
 """Clouds of points: thinned, with normals, cleaned, brought together, cut into planes, drawn, written.
 
-Everything here runs on NumPy and SciPy; where open3d is installed (`pip install factorlab[cloud]`), Poisson
-surfaces come with it, and the rest can be asked of it through `backend="open3d"`.
+Everything here runs on NumPy and SciPy.  Where open3d is installed (`pip install 'factorlab[cloud]'`), Poisson
+surfaces come with it, and the rest can be asked of it by `backend="open3d"`.
 """
 
+from vision3d.cloud.normals import Normals, estimate_normals
+from vision3d.cloud.outliers import outliers_by_radius, remove_outliers
 from vision3d.cloud.ply import Ply, read_ply, write_ply
+from vision3d.cloud.registration import IcpResult, icp
+from vision3d.cloud.splat import splat, viewpoint
+from vision3d.cloud.surface import Mesh, poisson_mesh
+from vision3d.cloud.thinning import Voxels, voxel_downsample
 
-__all__ = ["Ply", "read_ply", "write_ply"]
+__all__ = [
+    "IcpResult",
+    "Mesh",
+    "Normals",
+    "Ply",
+    "Voxels",
+    "estimate_normals",
+    "icp",
+    "outliers_by_radius",
+    "poisson_mesh",
+    "read_ply",
+    "remove_outliers",
+    "splat",
+    "viewpoint",
+    "voxel_downsample",
+    "write_ply",
+]

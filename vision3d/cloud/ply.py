@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import DataError, ShapeError
+from vision3d.cloud.arrays import Array, beside, checked_points
 from vision3d.cloud.ply_parsing import parse
 
 __all__ = ["Ply", "read_ply", "write_ply"]
 
-Array = NDArray[np.float64]
 POSITION, NORMAL, COLOUR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
 
 
@@ -76,15 +76,15 @@ def write_ply(
     DataError
         where a point is not finite (viewers crash on those), or a face names no point.
     """
-    place = points_of(points)
+    place = checked_points(points)
     table = np.empty(len(place), [(name, "<f4") for name in POSITION] + _extra(colors, normals, scalars))
     columns: dict[str, ArrayLike] = dict(zip(POSITION, place.T, strict=True))
     if normals is not None:
-        columns |= dict(zip(NORMAL, _beside(normals, (len(place), 3), "normals").T, strict=True))
+        columns |= dict(zip(NORMAL, beside(normals, (len(place), 3), "normals").T, strict=True))
     if colors is not None:
-        columns |= dict(zip(COLOUR, _beside(colors, (len(place), 3), "colors").T, strict=True))
+        columns |= dict(zip(COLOUR, beside(colors, (len(place), 3), "colors").T, strict=True))
     for name, values in (scalars or {}).items():
-        columns[name] = _beside(values, (len(place),), f"scalars[{name!r}]")
+        columns[name] = beside(values, (len(place),), f"scalars[{name!r}]")
     for name, column in columns.items():
         table[name] = column
     corners = None if faces is None else _faces(faces, len(place))
@@ -118,28 +118,6 @@ def read_ply(path: str | os.PathLike[str]) -> Ply:
     return Ply(points, coloured, normals, scalars, faces)
 
 
-def points_of(points: ArrayLike) -> Array:
-    """Points (N, 3), finite.
-
-    Raises
-    ------
-    ShapeError
-        where they are not (N, 3).
-    DataError
-        where one is not finite.
-    """
-    place = np.asarray(points, dtype=np.float64)
-    if place.ndim != 2 or place.shape[1] != 3:
-        raise ShapeError(f"points: expected (N, 3), got {place.shape}")
-    wrong = np.flatnonzero(~np.isfinite(place).all(axis=1))
-    if len(wrong):
-        raise DataError(
-            f"points: {len(wrong)} of {len(place)} are not finite, the first is number {wrong[0]}; leave "
-            "them out with points[np.isfinite(points).all(axis=1)]"
-        )
-    return place
-
-
 def _extra(colors: object, normals: object, scalars: Mapping[str, ArrayLike] | None) -> list[tuple[str, str]]:
     """Columns beyond the position: name and type of each."""
     fields = [(name, "<f4") for name in NORMAL] if normals is not None else []
@@ -150,13 +128,6 @@ def _extra(colors: object, normals: object, scalars: Mapping[str, ArrayLike] | N
             raise DataError(f"scalars: {name!r} cannot name a column of a PLY file; one word, not in {taken}")
         fields.append((name, "<f4"))
     return fields
-
-
-def _beside(values: ArrayLike, shape: tuple[int, ...], what: str) -> NDArray[Any]:
-    array = np.asarray(values)
-    if array.shape != shape:
-        raise ShapeError(f"{what}: expected {shape} to go with the points, got {array.shape}")
-    return array
 
 
 def _faces(faces: ArrayLike, count: int) -> NDArray[np.int64]:
