@@ -1,7 +1,7 @@
 """Clouds of points: thinned, with normals, cleaned, brought together, cut into planes, drawn, written.
 
-Everything here runs on NumPy and SciPy.  Where open3d is installed (`pip install 'factorlab[cloud]'`), Poisson
-surfaces come with it, and the rest can be asked of it by `backend="open3d"`.
+Everything here runs on NumPy and SciPy.  Where open3d is installed (`pip install 'factorlab[cloud]'`),
+Poisson surfaces come with it, and the rest can be asked of it by `backend="open3d"`.
 """
 
 from vision3d.cloud.normals import Normals, estimate_normals

@@ -36,8 +36,9 @@ def test_what_needs_it_says_how_to_get_it(monkeypatch):
 
 def test_a_library_that_the_system_lacks_is_named(monkeypatch):
     with_open3d.open3d.cache_clear()
+    monkeypatch.setattr(with_open3d, "has_open3d", lambda: True)
     monkeypatch.setitem(sys.modules, "open3d", None)  # what an import of it then raises
-    with pytest.raises(ToolMissingError, match="cannot be loaded .*libegl1"):
+    with pytest.raises(ToolMissingError, match="it needs libEGL, libGL"):
         with_open3d.open3d()
 
 
