@@ -17,9 +17,14 @@ from vision3d.features.features import Array
 
 __all__ = ["refine_matches"]
 
-INFLATION = 6.0  # both images are smoothed, so that their noise is correlated
 BLUR_PX = 0.7  # interpolation is exact only for what is smooth
 ITERATIONS = 30
+LEFT_OUT = 1.15  # times the variance, on light that is known: interpolation, and steps that are not linear
+FLOOR_PX = 0.015  # what photographs leave that were sampled twice
+WORST_PX = 0.3  # beyond, the fit is no longer linear, and its covariance means nothing
+ENOUGH, SAMPLE = 30, 300  # patches that tell the correlation of the residuals
+_STEPS = np.arange(-3.0, 4.0)
+SMOOTHED = np.exp(-(_STEPS[:, None] ** 2 + _STEPS**2) / (4.0 * BLUR_PX**2))
 
 
 def refine_matches(
@@ -125,15 +130,35 @@ def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window:
         place = np.ascontiguousarray(found.b[rows] / own_b)
         turned = np.ascontiguousarray(found.warp[rows] * (own_a / own_b))
         covs, facts = np.empty((len(rows), 3)), np.empty((len(rows), 4))
-        align(
-            image_a, image_b, np.ascontiguousarray(found.a[rows] / own_a), place, turned, window.radius,
-            window.affine, ITERATIONS, window.reach, covs, facts,
-        )  # fmt: skip
-        good = (facts[:, 0] >= window.least) & np.isfinite(covs).all(axis=1)
+        own = np.ascontiguousarray(found.a[rows] / own_a)
+        rho = SMOOTHED
+        for some in (np.arange(0, len(rows), max(1, len(rows) // SAMPLE)), slice(None)):
+            lags = np.zeros_like(rho)
+            p, w, c, f = (np.ascontiguousarray(one[some]) for one in (place, turned, covs, facts))
+            align(
+                image_a, image_b, np.ascontiguousarray(own[some]), p, w, window.radius, window.affine,
+                ITERATIONS, window.reach, rho, c, f, lags,
+            )  # fmt: skip
+            rho = _correlation(lags)
+        place, turned, covs, facts = p, w, c, f
+        with np.errstate(invalid="ignore"):
+            sure = (covs[:, [0, 2]] >= 0.0).all(axis=1) & (covs[:, 0] + covs[:, 2] < 2.0 * WORST_PX**2)
+        good = (facts[:, 0] >= window.least) & sure
         done = rows[good]
         found.b[done], found.warp[done] = place[good] * own_b, turned[good] * (own_b / own_a)
-        found.cov[done] = INFLATION * own_b**2 * covs[good][:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+        found.cov[done] = own_b**2 * (
+            LEFT_OUT * covs[good][:, [0, 1, 1, 2]].reshape(-1, 2, 2) + FLOOR_PX**2 * np.eye(2)
+        )
         found.ok[done] = True
+
+
+def _correlation(lags: Array) -> Array:
+    """Sums of lags as a correlation; that of the smoothing where there was no patch to measure it on."""
+    most = lags[lags.shape[0] // 2, lags.shape[1] // 2]
+    if most < ENOUGH:
+        return SMOOTHED
+    both = 0.5 * (lags + lags[::-1, ::-1])
+    return np.ascontiguousarray(np.maximum(both / most, SMOOTHED))
 
 
 class _Pyramid:

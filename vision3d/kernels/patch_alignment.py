@@ -15,125 +15,19 @@ import math
 import numba
 import numpy as np
 
-from vision3d.kernels import inlined, kernel
+from vision3d.kernels import kernel
 from vision3d.kernels.arrays import b0, f0, f2, i0, w2, w3
+from vision3d.kernels.cubic import inside, slopes_at, value_at
+from vision3d.kernels.patch_covariance import P, correlate, factor, information, place_cov, solve
 
 __all__ = ["align"]
 
-P = 8
 STILL_PX = 2e-3
 image = numba.types.Array(numba.float32, 2, "C", readonly=True)
 
 
-@inlined
-def _cubic(f, w):
-    """Weights of four neighbours at a fraction f past the second (Catmull and Rom)."""
-    w[0] = f * (-0.5 + f * (1.0 - 0.5 * f))
-    w[1] = 1.0 + f * f * (-2.5 + 1.5 * f)
-    w[2] = f * (0.5 + f * (2.0 - 1.5 * f))
-    w[3] = f * f * (-0.5 + 0.5 * f)
-
-
-@inlined
-def _cubic_slope(f, w):
-    """Derivatives of those weights."""
-    w[0] = -0.5 + f * (2.0 - 1.5 * f)
-    w[1] = f * (-5.0 + 4.5 * f)
-    w[2] = 0.5 + f * (4.0 - 4.5 * f)
-    w[3] = f * (-1.0 + 1.5 * f)
-
-
-@inlined
-def _value(picture, x, y, wx, wy):
-    """The image between its pixels, 1 to size - 2."""
-    i, j = math.floor(x), math.floor(y)
-    _cubic(x - i, wx)
-    _cubic(y - j, wy)
-    total = 0.0
-    for n in range(4):
-        line = picture[j - 1 + n]
-        total += wy[n] * (wx[0] * line[i - 1] + wx[1] * line[i] + wx[2] * line[i + 1] + wx[3] * line[i + 2])
-    return total
-
-
-@inlined
-def _slopes(picture, x, y, wx, wy, out):
-    """Its derivatives by x and y."""
-    i, j = math.floor(x), math.floor(y)
-    _cubic_slope(x - i, wx)
-    _cubic(y - j, wy)
-    dx = 0.0
-    for n in range(4):
-        for m in range(4):
-            dx += wy[n] * wx[m] * picture[j - 1 + n, i - 1 + m]
-    _cubic(x - i, wx)
-    _cubic_slope(y - j, wy)
-    dy = 0.0
-    for n in range(4):
-        for m in range(4):
-            dy += wy[n] * wx[m] * picture[j - 1 + n, i - 1 + m]
-    out[0], out[1] = dx, dy
-
-
-@inlined
-def _inside(picture, x, y):
-    return 1.0 <= x < picture.shape[1] - 2.0 and 1.0 <= y < picture.shape[0] - 2.0
-
-
-@inlined
-def _factor(A, L, first):
-    """Cholesky of the rows and columns from `first` on; whether it exists."""
-    for i in range(first, P):
-        for j in range(first, i + 1):
-            s = A[i, j]
-            for k in range(first, j):
-                s -= L[i, k] * L[j, k]
-            if i == j:
-                if s <= 1e-9 * A[i, i] or s <= 0.0:
-                    return False
-                L[i, i] = math.sqrt(s)
-            else:
-                L[i, j] = s / L[j, j]
-    return True
-
-
-@inlined
-def _solve(L, first, x):
-    for i in range(first, P):
-        for k in range(first, i):
-            x[i] -= L[i, k] * x[k]
-        x[i] /= L[i, i]
-    for i in range(P - 1, first - 1, -1):
-        for k in range(i + 1, P):
-            x[i] -= L[k, i] * x[k]
-        x[i] /= L[i, i]
-
-
-@inlined
-def _place_cov(L, G, lead, shift, noise, q, column, A, a, b, c, d, out):
-    """xx, xy, yy of M d for the covariance of d in the sandwich; A is overwritten."""
-    for r in range(2):
-        for i in range(P):
-            q[i] = 0.0
-        q[shift + r] = 1.0
-        _solve(L, lead, q)
-        for i in range(lead, P):
-            A[r, i] = q[i]
-    for r in range(2):
-        for s in range(r, 2):
-            total = 0.0
-            for i in range(lead, P):
-                for j in range(lead, P):
-                    total += A[r, i] * G[i, j] * A[s, j]
-            column[r + s] = noise * total
-    xx, xy, yy = column[0], column[1], column[2]
-    out[0] = a * a * xx + 2.0 * a * b * xy + b * b * yy
-    out[1] = a * c * xx + (a * d + b * c) * xy + b * d * yy
-    out[2] = c * c * xx + 2.0 * c * d * xy + d * d * yy
-
-
-@kernel(numba.void(image, image, f2, w2, w3, i0, b0, i0, f0, w2, w2))
-def align(first, second, points, at, warps, radius, affine, most, reach, covs, facts):
+@kernel(numba.void(image, image, f2, w2, w3, i0, b0, i0, f0, f2, w2, w2, w2))
+def align(first, second, points, at, warps, radius, affine, most, reach, rho, covs, facts, lags):
     """Refine the place and the warp of every patch of the first image in the second.
 
     Parameters
@@ -146,14 +40,18 @@ def align(first, second, points, at, warps, radius, affine, most, reach, covs, f
     affine : estimate the warp; otherwise shift, gain and offset only
     most : iterations
     reach : farthest that a patch may move, px of the second
+    rho : (7, 7) correlation of residuals three pixels either way, 1 in its middle
     covs : (N, 3) px² out: xx, xy, yy in the second for residuals of the size found
     facts : (N, 4) out: correlation after the fit (-1 where it failed), iterations, gain, rms of the residuals
+    lags : (7, 7) in and out: sums of the correlation that the residuals of each patch have
     """
     side = 2 * radius + 1
     J = np.empty((side * side, P))
     weight = np.empty(side * side)
-    A, L, G = np.empty((P, P)), np.zeros((P, P)), np.empty((P, P))
-    q, column = np.empty(P), np.empty(P)
+    A, L = np.empty((P, P)), np.zeros((P, P))
+    residual, field, along = np.empty(side * side), np.empty((2, side * side)), np.empty((2, P))
+    light = np.empty(side * side)
+    q, column, cov = np.empty(P), np.empty(P), np.empty(3)
     wx, wy, slope = np.empty(4), np.empty(4), np.empty(2)
     spread = 2.0 / (radius * radius)
     # parameters in order d, then D, then gain and offset; without D the order is D (unused), d, gain, offset
@@ -164,21 +62,21 @@ def align(first, second, points, at, warps, radius, affine, most, reach, covs, f
         facts[n, 0] = -1.0
         facts[n, 1] = facts[n, 2] = facts[n, 3] = 0.0
         px, py = points[n, 0], points[n, 1]
-        if not (_inside(first, px - radius, py - radius) and _inside(first, px + radius, py + radius)):
+        if not (inside(first, px - radius, py - radius) and inside(first, px + radius, py + radius)):
             continue
         A[:] = 0.0
         k = 0
         total = mean = 0.0
         for v in range(-radius, radius + 1):
             for u in range(-radius, radius + 1):
-                _slopes(first, px + u, py + v, wx, wy, slope)
+                slopes_at(first, px + u, py + v, wx, wy, slope)
                 w = math.exp(-spread * (u * u + v * v))
                 row = J[k]
                 row[shift], row[shift + 1] = slope[0], slope[1]
                 if affine:
                     row[2], row[3] = slope[0] * u, slope[0] * v
                     row[4], row[5] = slope[1] * u, slope[1] * v
-                row[6], row[7] = _value(first, px + u, py + v, wx, wy), 1.0
+                row[6], row[7] = value_at(first, px + u, py + v, wx, wy), 1.0
                 weight[k] = w
                 total += w
                 mean += w * row[6]
@@ -189,7 +87,7 @@ def align(first, second, points, at, warps, radius, affine, most, reach, covs, f
             for i in range(lead, P):
                 for j in range(lead, i + 1):
                     A[i, j] += weight[k] * J[k, i] * J[k, j]
-        if not _factor(A, L, lead):
+        if not factor(A, L, lead):
             continue
         x0, y0 = at[n, 0], at[n, 1]
         x, y = x0, y0
@@ -206,10 +104,11 @@ def align(first, second, points, at, warps, radius, affine, most, reach, covs, f
             for v in range(-radius, radius + 1):
                 for u in range(-radius, radius + 1):
                     bx, by = x + a * u + b * v, y + c * u + d * v
-                    if not _inside(second, bx, by):
+                    if not inside(second, bx, by):
                         failed = True
                         break
-                    value = _value(second, bx, by, wx, wy)
+                    value = value_at(second, bx, by, wx, wy)
+                    light[k] = value
                     w = weight[k] * value
                     energy += w * value
                     level += w
@@ -223,7 +122,7 @@ def align(first, second, points, at, warps, radius, affine, most, reach, covs, f
             cost = energy
             for i in range(lead, P):
                 column[i] = q[i]
-            _solve(L, lead, q)
+            solve(L, lead, q)
             for i in range(lead, P):
                 cost -= column[i] * q[i]
             g = q[6]
@@ -260,19 +159,20 @@ def align(first, second, points, at, warps, radius, affine, most, reach, covs, f
         facts[n, 3] = math.sqrt(cost / total)
         at[n, 0], at[n, 1] = x, y
         warps[n, 0, 0], warps[n, 0, 1], warps[n, 1, 0], warps[n, 1, 1] = a, b, c, d
-        # weights are no precisions, so the sandwich: A^-1 (sum w² J Jᵀ) A^-1
-        G[:] = 0.0
         for k in range(side * side):
+            residual[k] = light[k]
             for i in range(lead, P):
-                for j in range(lead, i + 1):
-                    G[i, j] += weight[k] * weight[k] * J[k, i] * J[k, j]
-        for i in range(lead, P):
-            for j in range(lead, i):
-                G[j, i] = G[i, j]
-        # the weighted residuals stand for as many samples as the window has room for, less the parameters
-        samples = 0.0
-        for k in range(side * side):
-            samples += weight[k] * weight[k]
-        samples = total * total / samples
-        noise = cost / total * samples / max(samples - (P - lead), 1.0) / (q[6] * q[6])
-        _place_cov(L, G, lead, shift, noise, q, column, A, a, b, c, d, covs[n])
+                residual[k] -= q[i] * J[k, i]
+        correlate(residual, weight, side, lags)
+        if not information(second, x, y, warps[n], q[6], J, weight, radius, lead, shift, wx, wy, slope, A, L):
+            facts[n, 0] = -1.0
+            continue
+        # weights are no precisions and residuals no white noise, so the sandwich
+        plain = place_cov(L, J, weight, side, lead, shift, rho, along, field, cov)
+        # every parameter takes about as much of the cost as the two of the place do
+        taken = (P - lead) * max(cov[0] + cov[2], 0.0) / plain
+        noise = cost / max(total - taken, 0.25 * total) / (q[6] * q[6])
+        xx, xy, yy = noise * cov[0], noise * cov[1], noise * cov[2]
+        covs[n, 0] = a * a * xx + 2.0 * a * b * xy + b * b * yy
+        covs[n, 1] = a * c * xx + (a * d + b * c) * xy + b * d * yy
+        covs[n, 2] = c * c * xx + 2.0 * c * d * xy + d * d * yy

@@ -69,3 +69,28 @@ def test_nothing_gives_nothing(pair):
     assert found.shape == (0, 2)
     assert cov.shape == (0, 2, 2)
     assert len(ok) == 0
+
+
+@pytest.mark.parametrize("amplitude", [4.0, 10.0, 22.0])
+@pytest.mark.parametrize("noise", [1.5, 3.0])
+def test_covariance_is_honest(amplitude, noise, rng):
+    """Normalised squared errors of known light: two degrees of freedom each, so 1 after halving."""
+    y, x = np.mgrid[:300, :340].astype(float)
+    matrix, shift = np.array([[0.9, 0.1], [-0.2, 1.1]]), np.array([20.3, -2.7])
+    back = np.stack([x - shift[0], y - shift[1]], axis=-1) @ np.linalg.inv(matrix).T
+    lights = (texture(1.5 * x, 1.5 * y), texture(1.5 * back[..., 0], 1.5 * back[..., 1]))
+    a, b = (
+        np.rint(127 + amplitude / 22 * (light - 127) + rng.normal(0, noise, light.shape)).astype(np.uint8)
+        for light in lights
+    )
+    points = rng.uniform(60, 230, (400, 2))
+    truth = points @ matrix.T + shift
+    start = truth + rng.uniform(-1, 1, truth.shape)
+    found, cov, ok = refine_matches(
+        a, b, points, start, warps=np.broadcast_to(matrix, (400, 2, 2)), min_correlation=0.5
+    )
+    error = (found - truth)[ok]
+    nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(cov[ok]), error) / 2
+    assert ok.mean() > 0.6
+    # the floor, which photographs need, is all that strong texture has left
+    assert (0.7 if amplitude < 20 else 0.4) < nees.mean() < 1.35
