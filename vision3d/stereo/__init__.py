@@ -5,8 +5,25 @@ pair = rectify(rig)                         # a point of both images lies in one
 left, right = pair.images(left, right)
 """
 
+from vision3d.stereo.back_projection import DepthCloud, back_project, cloud_of
+from vision3d.stereo.depth import Depth, depth_of
+from vision3d.stereo.disparity import Disparity, StereoSettings, compute_disparity
 from vision3d.stereo.rectification import Rectification, rectify
 from vision3d.stereo.rig import StereoRig
 from vision3d.stereo.rig_files import read_rig, write_rig
 
-__all__ = ["Rectification", "StereoRig", "read_rig", "rectify", "write_rig"]
+__all__ = [
+    "Depth",
+    "DepthCloud",
+    "Disparity",
+    "Rectification",
+    "StereoRig",
+    "StereoSettings",
+    "back_project",
+    "cloud_of",
+    "compute_disparity",
+    "depth_of",
+    "read_rig",
+    "rectify",
+    "write_rig",
+]
