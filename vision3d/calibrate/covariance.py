@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vision3d.calibrate.adjustment import Blocks, schur
+from vision3d.calibrate.descent import Blocks, schur
 
 __all__ = ["Covariances", "covariances", "reduced"]
 

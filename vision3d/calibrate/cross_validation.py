@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vision3d.calibrate.adjustment import Unknowns, adjust, linearize, schur
+from vision3d.calibrate.adjustment import Unknowns, adjust, linearize
 from vision3d.calibrate.calibration import Calibration
 from vision3d.calibrate.covariance import reduced
+from vision3d.calibrate.descent import schur
 from vision3d.calibrate.look_alikes import folds_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.robust import weights_of

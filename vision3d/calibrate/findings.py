@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.manifold.quaternion import rotation_matrix
+from vision3d.calibrate.adjustment import Unknowns
 from vision3d.calibrate.covariance import Covariances
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.robust import Trusted
@@ -28,7 +29,7 @@ def findings_of(
     views: tuple[View, ...],
     problem: Problem,
     camera: Camera,
-    trusted: Trusted,
+    trusted: Trusted[Unknowns],
     left_out: tuple[tuple[int, int], ...],
     known: Covariances,
 ) -> tuple[str, ...]:
@@ -78,7 +79,7 @@ def remarks_of(known: Covariances, groups: NDArray[np.int64]) -> tuple[str, ...]
     return tuple(found)
 
 
-def _worse_views(views: tuple[View, ...], problem: Problem, trusted: Trusted) -> Iterator[str]:
+def _worse_views(views: tuple[View, ...], problem: Problem, trusted: Trusted[Unknowns]) -> Iterator[str]:
     """Views that were weighted down as a whole."""
     squares = np.sum(trusted.solution.blocks.residuals**2, axis=1)
     for v in trusted.outlier_views:

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError
 from sequential.manifold.quaternion import quaternion_from_matrix
-from vision3d.calibrate.adjustment import PRIOR_STD, Solution, Unknowns, adjust
+from vision3d.calibrate.adjustment import PRIOR_STD, Unknowns, adjust
 from vision3d.calibrate.calibration import Calibration
+from vision3d.calibrate.descent import Solution
 from vision3d.calibrate.flatness import with_flatness
 from vision3d.calibrate.noise import floor_of
 from vision3d.calibrate.problem import Problem
 from vision3d.calibrate.result import result_of, scale_of
-from vision3d.calibrate.robust import fit_robustly, weights_of, weights_of_views
+from vision3d.calibrate.robust import Trusted, fit_robustly, weights_of, weights_of_views
 from vision3d.calibrate.start import begin, linear_pose
 from vision3d.camera import LENSES, Camera
 from vision3d.views import View
@@ -83,13 +84,20 @@ def calibrate(
     begun = _grow(problem, views, lens, start, robust=robust)
     free = np.ones(len(begun.unknowns.parameters) + 2, dtype=bool)
     free[-2:] = board_warp
-    trusted = fit_robustly(problem, begun, free, robust=robust)
+    trusted = _trusted(problem, begun, free, robust=robust)
     floor_px = floor_of(trusted.solution.blocks.residuals, problem.sigma_px)
     if floor_px > 0.0 or lens in PRIOR_STD:
         problem = Problem.of(views, floor_px, scale_of(problem, trusted, free))
-        trusted = fit_robustly(problem, trusted.solution, free, robust=robust)
+        trusted = _trusted(problem, trusted.solution, free, robust=robust)
     found = result_of(views, problem, trusted, free)
     return found if board_warp else with_flatness(found)
+
+
+def _trusted(problem: Problem, begun: Solution[Unknowns], free: Mask, *, robust: bool) -> Trusted[Unknowns]:
+    def solve(at: Unknowns, weights: Array, iterations: int) -> Solution[Unknowns]:
+        return adjust(problem, at, weights, free, iterations=iterations)
+
+    return fit_robustly(problem, begun, solve, robust=robust)
 
 
 def _check(views: tuple[View, ...], lens: str) -> None:
@@ -123,7 +131,7 @@ def _size(view: View) -> str:
 
 def _grow(
     problem: Problem, views: tuple[View, ...], lens: str, start: Calibration | None, *, robust: bool
-) -> Solution:
+) -> Solution[Unknowns]:
     """Free the parameters in three stages, so that a strong distortion does not lead astray."""
     count = 4 + len(LENSES[lens].distortion)
     weights = weights_of(problem, np.ones(len(problem.points)))
@@ -169,7 +177,7 @@ def _acceptable(problem: Problem, weights: Array) -> float:
     return 0.5 * float(np.sum(2.0 * weights))
 
 
-def _staged(problem: Problem, weights: Array, unknowns: Unknowns, stages: int = 3) -> Solution:
+def _staged(problem: Problem, weights: Array, unknowns: Unknowns, stages: int = 3) -> Solution[Unknowns]:
     names = LENSES[unknowns.lens].parameters
     focal = np.array([name in {"fx", "fy", "k1"} for name in names] + [False, False])
     radial = np.array([name in {"fx", "fy", "cx", "cy", *RADIAL} for name in names] + [False, False])

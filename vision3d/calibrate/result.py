@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import UnderConstrainedError
 from sequential.manifold.quaternion import rotation_matrix
+from vision3d.calibrate.adjustment import Unknowns
 from vision3d.calibrate.calibration import Calibration, SolveReport
 from vision3d.calibrate.covariance import covariances
 from vision3d.calibrate.findings import findings_of, remarks_of
@@ -25,7 +26,9 @@ FREE_FOCAL = 0.25
 """Relative standard deviation of a focal length from which the views are said to leave it free."""
 
 
-def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free: Mask) -> Calibration:
+def result_of(
+    views: tuple[View, ...], problem: Problem, trusted: Trusted[Unknowns], free: Mask
+) -> Calibration:
     """Judge the solution and put everything together.
 
     Raises
@@ -92,7 +95,7 @@ def result_of(views: tuple[View, ...], problem: Problem, trusted: Trusted, free:
     )
 
 
-def scale_of(problem: Problem, trusted: Trusted, free: Mask) -> float:
+def scale_of(problem: Problem, trusted: Trusted[Unknowns], free: Mask) -> float:
     """Standard deviation of the residuals in units of sigma, judged by the freedom that is left."""
     freedom = 2 * int(np.count_nonzero(trusted.weights)) - int(free.sum()) - 6 * problem.count
     cost = trusted.solution.blocks.cost(weights_of(problem, trusted.weights))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vision3d.calibrate.adjustment import FAR_PX, Solution, adjust
-from vision3d.calibrate.problem import Problem
+from vision3d.calibrate.descent import FAR_PX, ITERATIONS, Solution, State
 
-__all__ = ["Trusted", "fit_robustly", "weights_of", "weights_of_views"]
+__all__ = ["Corners", "Trusted", "fit_robustly", "weights_of", "weights_of_views"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,8 +26,31 @@ WORSE_VIEW = 3.0
 ROUNDS = 12
 
 
+class Corners(Protocol):
+    """What of a problem is asked here: its corners view by view, and how sure each is."""
+
+    @property
+    def sigma_px(self) -> Array:
+        """(M,), standard deviation of every corner, per axis."""
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """(V + 1,): view v has the corners starts[v] to starts[v + 1]."""
+
+    @property
+    def count(self) -> int:
+        """How many views there are."""
+
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        """Number of the view of every corner, (M,)."""
+
+    def split(self, values: Array) -> tuple[Array, ...]:
+        """Cut an array (M, ...) into one array a view."""
+
+
 @dataclass(frozen=True, eq=False)
-class Trusted:
+class Trusted(Generic[State]):
     """Where a robust fit ended: the solution, its weights, and whom it trusts.
 
     Attributes
@@ -41,18 +65,18 @@ class Trusted:
         Steps of all rounds.
     """
 
-    solution: Solution
+    solution: Solution[State]
     weights: Array
     outlier_views: tuple[int, ...]
     iterations: int
 
 
-def weights_of(problem: Problem, relative: Array) -> Array:
+def weights_of(problem: Corners, relative: Array) -> Array:
     """Weights in 1/px² from weights in units of 1 / sigma²."""
     return relative / problem.sigma_px**2
 
 
-def weights_of_views(problem: Problem, residuals: Array) -> Array:
+def weights_of_views(problem: Corners, residuals: Array) -> Array:
     """Weight (M,) of every corner by its view: 1, or less where the whole view fits badly."""
     norms = np.linalg.norm(residuals, axis=1) / problem.sigma_px
     norms = np.where(np.isfinite(norms), norms, FAR_PX)
@@ -62,15 +86,23 @@ def weights_of_views(problem: Problem, residuals: Array) -> Array:
     return weight[problem.owner]
 
 
-def fit_robustly(problem: Problem, begun: Solution, free: Mask, *, robust: bool = True) -> Trusted:
+def fit_robustly(
+    problem: Corners,
+    begun: Solution[State],
+    solve: Callable[[State, Array, int], Solution[State]],
+    *,
+    robust: bool = True,
+) -> Trusted[State]:
     """Least squares over the corners that can be believed.
+
+    `solve` is given where to begin, weights (M,) in 1/px², and how many steps it may try.
 
     Least squares first.  If a corner is then further off than Gaussian noise explains, Cauchy's loss takes
     over until it settles, the corners beyond the limit leave, and least squares ends it, so that the
     covariance is that of least squares.  Scales are medians, which a half of wrong corners cannot move.
     """
-    views = np.ones(len(problem.points))
-    solution = adjust(problem, begun.unknowns, weights_of(problem, views), free)
+    views = np.ones(len(problem.sigma_px))
+    solution = solve(begun.unknowns, weights_of(problem, views), ITERATIONS)
     iterations = begun.iterations + solution.iterations
     if not robust or not _doubtful(problem, solution, views).any():
         return Trusted(solution, views, (), iterations)
@@ -78,7 +110,7 @@ def fit_robustly(problem: Problem, begun: Solution, free: Mask, *, robust: bool 
     for _ in range(ROUNDS):
         views = weights_of_views(problem, solution.blocks.residuals)
         ahead = views / (1.0 + (_distance(problem, solution, views) / CAUCHY) ** 2)
-        solution = adjust(problem, solution.unknowns, weights_of(problem, ahead), free, iterations=15)
+        solution = solve(solution.unknowns, weights_of(problem, ahead), 15)
         iterations += solution.iterations
         if np.abs(ahead - relative).max() < 1e-3:
             break
@@ -87,7 +119,7 @@ def fit_robustly(problem: Problem, begun: Solution, free: Mask, *, robust: bool 
         views = weights_of_views(problem, solution.blocks.residuals)
         ahead = np.where(_doubtful(problem, solution, views), 0.0, views)
         ahead = _enough(problem, ahead, views)
-        solution = adjust(problem, solution.unknowns, weights_of(problem, ahead), free)
+        solution = solve(solution.unknowns, weights_of(problem, ahead), ITERATIONS)
         iterations += solution.iterations
         settled = np.array_equal(ahead > 0.0, relative > 0.0) and np.allclose(ahead, relative, rtol=1e-2)
         relative = ahead
@@ -97,21 +129,21 @@ def fit_robustly(problem: Problem, begun: Solution, free: Mask, *, robust: bool 
     return Trusted(solution, relative, tuple(int(v) for v in worse), iterations)
 
 
-def _distance(problem: Problem, solution: Solution, views: Array) -> Array:
+def _distance(problem: Corners, solution: Solution[State], views: Array) -> Array:
     """Residuals in units of the typical one, whitened, (M,); infinite where there is no projection."""
     norms = np.linalg.norm(solution.blocks.residuals, axis=1) / problem.sigma_px
     norms = np.where(np.isfinite(norms), norms, np.inf) * np.sqrt(views)
     return norms / max(float(np.median(norms)) / MEDIAN_OF_RAYLEIGH, 1e-9)
 
 
-def _doubtful(problem: Problem, solution: Solution, views: Array) -> Mask:
+def _doubtful(problem: Corners, solution: Solution[State], views: Array) -> Mask:
     """Corners further off than any of M Gaussian ones would be, but for a rare false alarm."""
-    limit = np.sqrt(2.0 * np.log(len(problem.points) / FALSE_ALARMS))
+    limit = np.sqrt(2.0 * np.log(len(problem.sigma_px) / FALSE_ALARMS))
     doubtful: Mask = _distance(problem, solution, views) > limit
     return doubtful
 
 
-def _enough(problem: Problem, relative: Array, views: Array) -> Array:
+def _enough(problem: Corners, relative: Array, views: Array) -> Array:
     """Give a view back its corners where too few would be left to say where the board is."""
     kept = relative.copy()
     for v in range(problem.count):

@@ -7,7 +7,8 @@ import pytest
 from calibration_worlds import CAMERAS, world
 
 from sequential.manifold import SE3
-from vision3d.calibrate.adjustment import Unknowns, adjust, linearize, schur
+from vision3d.calibrate.adjustment import Unknowns, adjust, linearize
+from vision3d.calibrate.descent import schur
 from vision3d.calibrate.problem import Problem
 
 
