@@ -19,7 +19,7 @@ import numba
 
 from sequential.cache_place import cache_place
 
-__all__ = ["cache_folder", "inlined", "kernel"]
+__all__ = ["cache_folder", "entry", "inlined", "kernel"]
 
 _IMPORTED = re.compile(r"from vision3d\.kernels\.(\w+) import")
 
@@ -38,6 +38,16 @@ def inlined(function: Any) -> Any:
     """Decorate a small function that kernels call: it becomes a part of them."""
     with _kept():
         return numba.njit(cache=True, error_model="numpy", forceinline=True)(function)
+
+
+def entry(signature: Any) -> Callable[[Any], Any]:
+    """Decorate a function that kernels call by its `.address`: a plain C function, kept on disk."""
+
+    def decorate(function: Any) -> Any:
+        with _kept():
+            return numba.cfunc(signature, cache=True, error_model="numpy")(function)
+
+    return decorate
 
 
 def cache_folder() -> Path:

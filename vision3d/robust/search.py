@@ -1,0 +1,227 @@
+"""One call for every model: `search` for the one that most rows agree with, `finish` it by all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import DataError, ModelError, NotFiniteError, ShapeError, UnderConstrainedError
+from vision3d.robust.backends import Outside
+from vision3d.robust.model import RobustModel
+from vision3d.robust.result import RobustFit
+from vision3d.robust.settings import DEFAULT, RansacSettings
+
+__all__ = ["Found", "assess", "fit", "relative_weights", "result_of", "search"]
+
+Array = NDArray[np.float64]
+MEDIAN = {1: 0.4549364, 2: 1.3862944, 3: 2.3659739}  # of chi squared, by degrees of freedom
+WITHIN = {1: 6.25, 2: 9.0, 3: 11.0}  # of chi squared: some 99 %
+PROSAC_TRIALS = 200_000.0
+REASONS = {1: "confidence reached", 2: "budget spent", 3: "all agree"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """What a search ends with: the model (p,), squared errors, and the weights (N,) of its last fit."""
+
+    model: Array
+    errors2: Array
+    weights: Array
+    sigma2: float
+    threshold2: float
+    iterations: int
+    stopped: str
+    backend: str = "own"
+
+
+def fit(
+    model: RobustModel,
+    data: Array,
+    settings: RansacSettings = DEFAULT,
+    *,
+    sigma: Array | None = None,
+    rng: np.random.Generator | None = None,
+) -> RobustFit:
+    """Fit any model to rows of data; `fit_homography` and its like are this, with a covariance.
+
+    Parameters
+    ----------
+    model : compiled, or `NumpyModel`
+    data : (N, columns), rows best first for PROSAC's order
+    settings : the threshold is in the unit of the model's error
+    sigma : (N,) standard deviations of the rows' errors, where they differ; the threshold is then that of a
+        row of median sigma
+    rng : where the seed comes from; the same without it every time
+
+    Returns
+    -------
+    RobustFit
+        its model is (parameters,); its cov is all NaN, as a squared error says too little for one
+
+    Raises
+    ------
+    DataError
+        for data of another shape, not finite, or of fewer rows than a sample takes.
+    UnderConstrainedError
+        where no sample determines a model: all of them are degenerate.
+    """
+    found = search(model, data, settings, relative_weights(sigma, len(data)), rng)
+    unknown = np.full((model.parameters, model.parameters), np.nan)
+    return result_of(found, found.model, unknown)
+
+
+def result_of(found: Found, model: Array, cov: Array, *, scale: float = 1.0) -> RobustFit:
+    """The result, with errors multiplied by scale: the unit of the data over that of the search."""
+    inliers = found.errors2 < found.threshold2
+    cost = np.where(inliers, found.errors2 / found.threshold2, 1.0)
+    return RobustFit(
+        model=model,
+        cov=cov,
+        inliers=inliers,
+        errors=scale * np.sqrt(found.errors2),
+        sigma=scale * float(np.sqrt(found.sigma2)),
+        iterations=found.iterations,
+        stopped=found.stopped,
+        score=float(cost.mean()),
+        threshold=scale * float(np.sqrt(found.threshold2)),
+        backend=found.backend,
+    )
+
+
+def relative_weights(sigma: Array | float | None, count: int) -> Array:
+    """(median sigma / sigma)² of each row; 1 without sigmas.
+
+    Raises
+    ------
+    DataError
+        for sigmas that are not one positive number a row.
+    """
+    if sigma is None or np.ndim(sigma) == 0:
+        return np.ones(count)
+    given = np.ascontiguousarray(sigma, dtype=np.float64)
+    if given.shape != (count,) or not (given > 0.0).all() or not np.isfinite(given).all():
+        raise DataError(
+            f"sigma is one positive standard deviation for each of {count} rows; got {given.shape}"
+        )
+    return np.asarray((np.median(given) / given) ** 2)
+
+
+def search(
+    model: RobustModel,
+    data: Array,
+    settings: RansacSettings,
+    weights: Array,
+    rng: np.random.Generator | None = None,
+) -> Found:
+    """Look for the model that most rows agree with, by the project's own loop."""
+    from vision3d.kernels.robust_local import polish
+    from vision3d.kernels.robust_loop import NONE_FOUND, robust_loop
+
+    rows = checked_rows(model, data)
+    n, threshold2 = len(rows), settings.threshold**2
+    best, errors, share, told = np.zeros(model.parameters), np.empty(n), np.empty(n), np.zeros(4)
+    seed = np.uint64(0 if rng is None else rng.integers(1 << 63))
+    with model.functions() as f:
+        addresses = np.array([f.solve, f.residuals, f.fit], np.int64)
+        code = robust_loop(
+            rows,
+            weights,
+            addresses,
+            _sizes(model, settings),
+            _options(settings, f.fit),
+            seed,
+            best,
+            errors,
+            told,
+        )
+        if code == NONE_FOUND:
+            raise UnderConstrainedError(
+                f"none of {int(told[0])} samples of {model.sample_size} rows determines a {model.name}: "
+                "they are degenerate (all equal, or on one line); give rows that differ"
+            )
+        if settings.method == "lmeds":
+            threshold2 = median_threshold2(model, errors)
+        blend = settings.refine == "mixture"
+        sigma2 = polish(addresses, rows, weights, threshold2, model.error_dof, blend, best, errors, share)
+    sigma2 *= _spare(model, errors, threshold2)
+    return Found(best, errors, share, sigma2, threshold2, int(told[0]), REASONS[code])
+
+
+def assess(
+    model: RobustModel, data: Array, settings: RansacSettings, weights: Array, given: Array, outside: Outside
+) -> Found:
+    """What the loop would say of a model (parameters,) that somebody else has found, left as it is."""
+    from vision3d.kernels.robust_scoring import errors_of
+
+    rows = checked_rows(model, data)
+    errors, given = np.empty(len(rows)), np.array(given, dtype=np.float64)
+    with model.functions() as f:
+        errors_of(f.residuals, rows, weights, given, errors)
+    robust = settings.method == "lmeds" or outside.backend.endswith("LMEDS")
+    threshold2 = median_threshold2(model, errors) if robust else settings.threshold**2
+    inside = errors < threshold2
+    sigma2 = float(errors[inside].mean()) / model.error_dof if inside.any() else np.nan
+    sigma2 *= _spare(model, errors, threshold2)
+    share = np.where(inside, weights, 0.0)
+    return Found(
+        given, errors, share, sigma2, threshold2, outside.iterations, outside.stopped, outside.backend
+    )
+
+
+def median_threshold2(model: RobustModel, errors2: Array) -> float:
+    """The squared threshold that LMedS takes from its median: some 99 % of Gaussian errors are below."""
+    spare = max(len(errors2) - model.sample_size, 1)
+    sigma2 = max(float(np.median(errors2)), 1e-30) / MEDIAN[model.error_dof]
+    return WITHIN[model.error_dof] * sigma2 * (1.0 + 5.0 / spare) ** 2
+
+
+def _spare(model: RobustModel, errors2: Array, threshold2: float) -> float:
+    """Number of errors over number of degrees of freedom left, NaN where none is left."""
+    errors = model.error_dof * int(np.count_nonzero(errors2 < threshold2))
+    return errors / (errors - model.freedom) if errors > model.freedom else np.nan
+
+
+def _sizes(model: RobustModel, settings: RansacSettings) -> NDArray[np.int64]:
+    return np.array(
+        [
+            model.sample_size,
+            model.max_solutions,
+            model.block,
+            model.inner_size,
+            settings.inner_samples,
+            model.solve_cost,
+        ]
+    )
+
+
+def _options(settings: RansacSettings, fit_address: int) -> Array:
+    kind = 2.0 if settings.method == "lmeds" else float(settings.score == "count")
+    return np.array(
+        [
+            settings.threshold**2,
+            settings.confidence,
+            settings.max_iterations,
+            kind,
+            settings.order == "prosac",
+            settings.local_optimisation and fit_address != 0,
+            PROSAC_TRIALS,
+        ],
+        dtype=np.float64,
+    )
+
+
+def checked_rows(model: RobustModel, data: Array) -> Array:
+    """The data as the loop takes it, or a sentence."""
+    rows = np.ascontiguousarray(data, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != model.columns:
+        raise ShapeError(f"a {model.name} is fitted to rows of {model.columns} numbers; got {rows.shape}")
+    if len(rows) < model.sample_size:
+        raise DataError(f"a {model.name} takes {model.sample_size} rows or more; got {len(rows)}")
+    if not np.isfinite(rows).all():
+        bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
+        raise NotFiniteError(f"row {bad} for the {model.name} is not finite: {rows[bad]}; leave it out")
+    if model.max_solutions < 1:
+        raise ModelError(f"{model.name}: max_solutions is at least 1; got {model.max_solutions}")
+    return rows
