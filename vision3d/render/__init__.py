@@ -1,6 +1,8 @@
-"""Rendered truth: photographs of boards, markers and ground lines by a camera that is known exactly."""
+"""Rendered truth: photographs of boards, markers, lines and whole scenes by a camera that is known exactly."""
 
 from vision3d.render.ground import GroundLine, RobotView, drive, line_pixels, random_line, render_ground
+from vision3d.render.material import Material, bricks, leaves, photograph, plain, speckles
+from vision3d.render.pairs import StereoView, render_stereo, transfer
 from vision3d.render.patterns import (
     board_planes,
     board_texture,
@@ -11,36 +13,63 @@ from vision3d.render.patterns import (
     marker_texture,
 )
 from vision3d.render.poses import RenderedSet, board_pixels, board_poses, render_set
+from vision3d.render.rooms import SCENES, corridor, desk, ground, repeated_wall, wall
 from vision3d.render.scene import Plane, render_planes
+from vision3d.render.shapes import Shape, box, rectangle, sphere
+from vision3d.render.solid import RenderedView, Scene, is_seen, render_scene, surface_points
 from vision3d.render.texture import Texture, cells, distance_field, picture
 from vision3d.render.video import RenderedFrame, moving_board, moving_markers, write_video
 
 __all__ = [
+    "SCENES",
     "GroundLine",
+    "Material",
     "Plane",
     "RenderedFrame",
     "RenderedSet",
+    "RenderedView",
     "RobotView",
+    "Scene",
+    "Shape",
+    "StereoView",
     "Texture",
     "board_pixels",
     "board_planes",
     "board_poses",
     "board_texture",
+    "box",
+    "bricks",
     "cells",
     "charuco_texture",
     "checkerboard_texture",
     "circles_texture",
+    "corridor",
+    "desk",
     "distance_field",
     "drive",
+    "ground",
+    "is_seen",
+    "leaves",
     "line_pixels",
     "marker_corners",
     "marker_texture",
     "moving_board",
     "moving_markers",
+    "photograph",
     "picture",
+    "plain",
     "random_line",
+    "rectangle",
     "render_ground",
     "render_planes",
+    "render_scene",
     "render_set",
+    "render_stereo",
+    "repeated_wall",
+    "speckles",
+    "sphere",
+    "surface_points",
+    "transfer",
+    "wall",
     "write_video",
 ]
