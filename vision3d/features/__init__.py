@@ -7,8 +7,10 @@
 Importing this loads neither OpenCV nor Numba.
 """
 
+from vision3d.features.consistency import supporters
 from vision3d.features.detection import KINDS, detect_features
 from vision3d.features.features import Features, Matches
+from vision3d.features.guided import guided_matches
 from vision3d.features.matching import match_features
 from vision3d.features.refining import refine_matches
 from vision3d.features.spreading import spread_rows
@@ -18,7 +20,9 @@ __all__ = [
     "Features",
     "Matches",
     "detect_features",
+    "guided_matches",
     "match_features",
     "refine_matches",
     "spread_rows",
+    "supporters",
 ]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from vision3d.features.detection import none_of
 from vision3d.features.features import Array, Features
+from vision3d.features.subpixel import CORNER_SIGMA_PX, settle_corners
 
 __all__ = ["described"]
 
@@ -29,8 +30,9 @@ def described(image: NDArray[np.uint8], mask: NDArray[np.uint8] | None, kind: st
         return none_of(kind, width, dtype)
     angle = orientations(image, pixels)
     own = _patches(image, pixels, angle) if patch else _bits(image, pixels, angle)
-    many = len(pixels)
-    return Features(pixels, own, np.full(many, float(PATCH_PX)), angle, response, np.full(many, 0.5), kind)
+    one = np.ones(len(pixels))
+    fine = settle_corners(image, pixels, one, climb=int(kind.startswith("fast")))
+    return Features(fine, own, PATCH_PX * one, angle, response, CORNER_SIGMA_PX * one, kind)
 
 
 def _fast(image: NDArray[np.uint8], mask: NDArray[np.uint8] | None) -> tuple[Array, Array]:

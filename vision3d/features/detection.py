@@ -26,7 +26,7 @@ __all__ = ["KINDS", "Kind", "detect_features"]
 
 Kind: TypeAlias = Literal["sift", "orb", "fast", "harris", "fast-patch", "harris-patch"]
 KINDS: tuple[str, ...] = get_args(Kind)
-SURPLUS = 4  # as many are found as are asked for, so that there is something to spread
+SURPLUS = 20  # as many are found as are asked for, so that there is something to spread
 
 
 def detect_features(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError
 from vision3d.features.features import Array, Features, Matches
 
-__all__ = ["match_features"]
+__all__ = ["APART_PX", "match_features", "match_table"]
 
 AT_ONCE = 4_000_000  # distances held in memory
 APART_PX = 10.0
@@ -49,9 +51,22 @@ def match_features(
     if a.binary != b.binary or a.descriptors.shape[1] != b.descriptors.shape[1]:
         told = [f"{f.kind or 'features'} of {f.descriptors.shape[1]} {f.descriptors.dtype}" for f in (a, b)]
         raise DataError(f"{told[0]} cannot be compared with {told[1]}; detect the same kind in both images")
+    return match_table(a, b, ratio=ratio, cross_check=cross_check, apart_px=apart_px)
+
+
+def match_table(
+    a: Features,
+    b: Features,
+    *,
+    ratio: float | None,
+    cross_check: bool,
+    apart_px: float,
+    gate: Callable[[slice], NDArray[np.bool_]] | None = None,
+) -> Matches:
+    """The same without checks, among pairs that `gate` allows: rows of a -> (rows, M) whether they may be."""
     if not len(a) or not len(b):
         return Matches(np.empty((0, 2), np.int64), np.empty(0), np.empty(0))
-    best, nearest, second, best_of_b = _nearest(a, b, apart_px)
+    best, nearest, second, best_of_b = _nearest(a, b, apart_px, gate)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.where(second > 0.0, nearest / second, 1.0)
     keep = best >= 0
@@ -65,7 +80,7 @@ def match_features(
 
 
 def _nearest(
-    a: Features, b: Features, apart_px: float
+    a: Features, b: Features, apart_px: float, gate: Callable[[slice], NDArray[np.bool_]] | None
 ) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
     """Nearest row of b, its distance, that of the second, and the nearest row of a for each of b."""
     from vision3d.kernels.nearest import two_nearest
@@ -77,11 +92,14 @@ def _nearest(
     step = max(1, AT_ONCE // m)
     for start in range(0, n, step):
         table = table_of(a.descriptors[start : start + step], b.descriptors)
+        if gate is not None:
+            table[~gate(slice(start, start + step))] = np.inf
         two_nearest(table, b.pixels, apart_px, start, best, nearest, second, best_of_b, nearest_of_b)
     if not a.binary:
         nearest, second = np.sqrt(nearest), np.sqrt(second)
         # a sum of three large terms rounds; the distance of the pair itself need not
-        nearest = np.linalg.norm(a.descriptors.astype(np.float64) - b.descriptors[best], axis=1)
+        own = np.linalg.norm(a.descriptors.astype(np.float64) - b.descriptors[best], axis=1)
+        nearest = np.where(best >= 0, own, nearest)
         second = np.maximum(second, nearest)
     return best, nearest, second, best_of_b
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,12 @@ from numpy.typing import NDArray
 
 from vision3d.features.detection import none_of
 from vision3d.features.features import Features
+from vision3d.features.subpixel import CORNER_SIGMA_PX, settle_corners
 
 __all__ = ["ORB_PATCH_PX", "orb", "sift"]
 
 ORB_PATCH_PX, ORB_STEP, ORB_LEVELS = 31, 1.2, 8
+SIFT_SIGMA_PX, SIFT_SIGMA_SHARE = 0.12, 0.018  # at size 0, and what each pixel of size adds
 SMALLEST_PX = 16  # side of an image below which there is no pyramid
 
 
@@ -41,10 +44,15 @@ def orb(image: NDArray[np.uint8], mask: NDArray[np.uint8] | None, count: int) ->
     keypoints, described = detector.detectAndCompute(image, mask)
     if not keypoints:
         return none_of("orb", 32, np.uint8)
-    return _features(keypoints, described, "orb")
+    found = _features(keypoints, described, "orb")
+    step = np.round(found.size_px / ORB_PATCH_PX, 4)
+    # levels are shrunk corner on corner, and their pixels counted from centres
+    pixels = settle_corners(image, found.pixels + 0.5 * (step[:, None] - 1.0), step)
+    return replace(found, pixels=pixels, sigma_px=CORNER_SIGMA_PX * step)
 
 
 def _features(keypoints: Any, described: NDArray[Any], kind: str) -> Features:
     rows = np.array([(*k.pt, k.size, k.angle, k.response) for k in keypoints], dtype=np.float64)
     size = rows[:, 2]
-    return Features(rows[:, :2], described, size, np.radians(rows[:, 3]), rows[:, 4], 0.05 * size, kind)
+    sigma = np.hypot(SIFT_SIGMA_PX, SIFT_SIGMA_SHARE * size)
+    return Features(rows[:, :2], described, size, np.radians(rows[:, 3]), rows[:, 4], sigma, kind)

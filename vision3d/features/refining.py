@@ -22,6 +22,7 @@ ITERATIONS = 30
 LEFT_OUT = 1.15  # times the variance, on light that is known: interpolation, and steps that are not linear
 FLOOR_PX = 0.015  # what photographs leave that were sampled twice
 WORST_PX = 0.3  # beyond, the fit is no longer linear, and its covariance means nothing
+Image = NDArray[np.float32]
 ENOUGH, SAMPLE = 30, 300  # patches that tell the correlation of the residuals
 _STEPS = np.arange(-3.0, 4.0)
 SMOOTHED = np.exp(-(_STEPS[:, None] ** 2 + _STEPS**2) / (4.0 * BLUR_PX**2))
@@ -115,8 +116,6 @@ class _Window:
 
 def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window: _Window) -> None:
     """One level of the pyramids; patches of like scales together."""
-    from vision3d.kernels.patch_alignment import align
-
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = np.log2(np.sqrt(np.abs(np.linalg.det(found.warp))))
     octaves = np.where(np.isfinite(scale), np.clip(np.rint(scale), -8, 8), 0).astype(int)
@@ -127,20 +126,10 @@ def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window:
             continue
         rows = np.flatnonzero((octaves == octave) & finite)
         own_a, own_b = 2.0 ** (level + max(0, -octave)), 2.0 ** (level + max(0, octave))
-        place = np.ascontiguousarray(found.b[rows] / own_b)
-        turned = np.ascontiguousarray(found.warp[rows] * (own_a / own_b))
-        covs, facts = np.empty((len(rows), 3)), np.empty((len(rows), 4))
-        own = np.ascontiguousarray(found.a[rows] / own_a)
-        rho = SMOOTHED
-        for some in (np.arange(0, len(rows), max(1, len(rows) // SAMPLE)), slice(None)):
-            lags = np.zeros_like(rho)
-            p, w, c, f = (np.ascontiguousarray(one[some]) for one in (place, turned, covs, facts))
-            align(
-                image_a, image_b, np.ascontiguousarray(own[some]), p, w, window.radius, window.affine,
-                ITERATIONS, window.reach, rho, c, f, lags,
-            )  # fmt: skip
-            rho = _correlation(lags)
-        place, turned, covs, facts = p, w, c, f
+        place, turned, covs, facts = _aligned(
+            image_a, image_b, found.a[rows] / own_a, found.b[rows] / own_b,
+            found.warp[rows] * (own_a / own_b), window,
+        )  # fmt: skip
         with np.errstate(invalid="ignore"):
             sure = (covs[:, [0, 2]] >= 0.0).all(axis=1) & (covs[:, 0] + covs[:, 2] < 2.0 * WORST_PX**2)
         good = (facts[:, 0] >= window.least) & sure
@@ -150,6 +139,27 @@ def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window:
             LEFT_OUT * covs[good][:, [0, 1, 1, 2]].reshape(-1, 2, 2) + FLOOR_PX**2 * np.eye(2)
         )
         found.ok[done] = True
+
+
+def _aligned(
+    first: Image, second: Image, a: Array, b: Array, warp: Array, window: _Window
+) -> tuple[Array, Array, Array, Array]:
+    """Places, warps, covariances and facts; a sample of the patches tells first what residuals are like."""
+    from vision3d.kernels.patch_alignment import align
+
+    rho = SMOOTHED
+    some: slice | NDArray[np.int64]
+    sample = np.arange(0, len(a), max(1, len(a) // SAMPLE))
+    place, turned, covs, facts = b, warp, np.empty((0, 3)), np.empty((0, 4))
+    for some in (sample, slice(None)):
+        points, place, turned = (np.array(one[some], order="C") for one in (a, b, warp))
+        covs, facts, lags = np.empty((len(points), 3)), np.empty((len(points), 4)), np.zeros_like(rho)
+        align(
+            first, second, points, place, turned, window.radius, window.affine, ITERATIONS, window.reach,
+            rho, covs, facts, lags,
+        )  # fmt: skip
+        rho = _correlation(lags)
+    return place, turned, covs, facts
 
 
 def _correlation(lags: Array) -> Array:
@@ -170,7 +180,7 @@ class _Pyramid:
         smooth = cv2.GaussianBlur(image.astype(np.float32), (0, 0), BLUR_PX)
         self._levels = [np.asarray(smooth, np.float32)]
 
-    def at(self, level: int) -> NDArray[np.float32] | None:
+    def at(self, level: int) -> Image | None:
         """A level; None where it would be too small to hold a patch."""
         import cv2
 

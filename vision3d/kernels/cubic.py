@@ -61,4 +61,5 @@ def slopes_at(picture, x, y, wx, wy, out):
 
 @inlined
 def inside(picture, x, y):
+    """Whether all sixteen neighbours exist."""
     return 1.0 <= x < picture.shape[1] - 2.0 and 1.0 <= y < picture.shape[0] - 2.0

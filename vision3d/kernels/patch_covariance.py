@@ -32,6 +32,7 @@ def factor(A, L, first):
 
 @inlined
 def solve(L, first, x):
+    """Replace x by the solution for the factor L."""
     for i in range(first, P):
         for k in range(first, i):
             x[i] -= L[i, k] * x[k]
