@@ -12,7 +12,7 @@ from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, n
 from vision3d.camera_files.opencv_storage import storage_content
 from vision3d.camera_files.opencv_vector import lens_of_vector, split_matrix
 
-__all__ = ["opencv_cameras", "opencv_text"]
+__all__ = ["opencv_cameras", "opencv_text", "storage_matrix"]
 
 NAMES = (
     ("camera", "camera_matrix", "distortion_coefficients"),
@@ -47,8 +47,8 @@ def opencv_text(camera: Camera, name: str = "camera") -> str:
         f"image_width: {camera.size[0]}",
         f"image_height: {camera.size[1]}",
         *fisheye,
-        *_matrix("camera_matrix", camera.matrix),
-        *_matrix("distortion_coefficients", vector[:, None]),
+        *storage_matrix("camera_matrix", camera.matrix),
+        *storage_matrix("distortion_coefficients", vector[:, None]),
     ]
     return "\n".join(lines) + "\n"
 
@@ -118,7 +118,8 @@ def _orb_slam(content: dict[str, Any], where: str, size: tuple[int, int] | None)
     return built(where, lens, intrinsics, coefficients, told, None)
 
 
-def _matrix(key: str, matrix: Any) -> list[str]:
+def storage_matrix(key: str, matrix: Any) -> list[str]:
+    """Lines of a matrix (rows, columns) under a key."""
     rows, columns = matrix.shape
     data = ", ".join(number(value) for value in matrix.ravel())
     return [

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sequential.errors import FileFormatError, ModelError
 from vision3d.camera import Camera
 from vision3d.camera_files.numbers import LENS_COMMENT, built, commented_lens, numbers, row, size_of
 
-__all__ = ["ros_cameras", "ros_text"]
+Array = NDArray[np.float64]
+
+__all__ = ["block_of", "ros_cameras", "ros_text"]
 
 MODELS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}
 LENS_OF = {
@@ -21,8 +26,18 @@ LENS_OF = {
 }
 
 
-def ros_text(camera: Camera, name: str = "camera") -> str:
+def ros_text(
+    camera: Camera,
+    name: str = "camera",
+    rectified: tuple[Array, Array] | None = None,
+) -> str:
     """The file of a camera.
+
+    Parameters
+    ----------
+    camera : to write
+    name : what it is called
+    rectified : rectification (3, 3) and projection (3, 4) of a camera of a stereo pair; None: it stands alone
 
     Raises
     ------
@@ -37,12 +52,17 @@ def ros_text(camera: Camera, name: str = "camera") -> str:
         )
     coefficients = [*camera.distortion.tolist(), *[0.0] * (MODELS[model] - len(camera.distortion))]
     fx, fy, cx, cy = camera.intrinsics.tolist()
+    # what a rectified image is an image of: alone, the same intrinsics without distortion
+    turn, projection = (
+        (np.eye(3), np.array([[fx, 0.0, cx, 0.0], [0.0, fy, cy, 0.0], [0.0, 0.0, 1.0, 0.0]]))
+        if rectified is None
+        else rectified
+    )
     blocks: dict[str, tuple[int, int, Any]] = {
         "camera_matrix": (3, 3, camera.matrix.ravel()),
         "distortion_coefficients": (1, len(coefficients), coefficients),
-        "rectification_matrix": (3, 3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
-        # what a rectified image is an image of: the same intrinsics without distortion
-        "projection_matrix": (3, 4, [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
+        "rectification_matrix": (3, 3, turn.ravel()),
+        "projection_matrix": (3, 4, projection.ravel()),
     }
     lines = [
         f"{LENS_COMMENT}{camera.lens}",
@@ -66,12 +86,12 @@ def ros_cameras(
     FileFormatError
         where an entry is missing, or a distortion model is another one.
     """
-    matrix = row(_data(document, "camera_matrix", where), 9, "camera_matrix", where)
+    matrix = row(block_of(document, "camera_matrix", where), 9, "camera_matrix", where)
     model = str(document.get("distortion_model") or "")
     coefficients: list[float] = []
     if "distortion_coefficients" in document:
         coefficients = row(
-            _data(document, "distortion_coefficients", where), None, "distortion_coefficients", where
+            block_of(document, "distortion_coefficients", where), None, "distortion_coefficients", where
         )
     elif model:
         raise FileFormatError(f"{where} names the model {model} and has no distortion_coefficients")
@@ -89,7 +109,14 @@ def ros_cameras(
     return {str(document.get("camera_name") or "camera"): camera}
 
 
-def _data(document: dict[str, Any], key: str, where: str) -> Any:
+def block_of(document: dict[str, Any], key: str, where: str) -> Any:
+    """The numbers of a matrix of a document.
+
+    Raises
+    ------
+    FileFormatError
+        where it has none of that name.
+    """
     block = document.get(key)
     if isinstance(block, dict) and "data" in block:
         return block["data"]
