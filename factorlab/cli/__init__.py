@@ -19,6 +19,7 @@ from factorlab.cli.live import live
 from factorlab.cli.markers import markers
 from factorlab.cli.objects import objects
 from factorlab.cli.record import record
+from factorlab.cli.sfm import sfm
 from factorlab.cli.sheet import sheet
 from factorlab.cli.tune import tune
 from factorlab.cli.undistort import undistort
@@ -66,6 +67,7 @@ for command in (
     undistort,
     markers,
     objects,
+    sfm,
     sheet,
     info,
     doctor,

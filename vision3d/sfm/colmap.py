@@ -44,9 +44,9 @@ def camera_to_pycolmap(camera: Camera, number: int = 1, model: str | None = None
     ModelError
         where COLMAP has no model for the lens.
     """
-    pycolmap = colmap()
+    theirs = colmap()
     name, parameters = colmap_parameters(camera, model)
-    made: pycolmap.Camera = pycolmap.Camera(
+    made: pycolmap.Camera = theirs.Camera(
         model=name, width=camera.size[0], height=camera.size[1], params=parameters, camera_id=number
     )
     made.has_prior_focal_length = True
@@ -115,9 +115,9 @@ def pose_from_pycolmap(rigid: pycolmap.Rigid3d) -> Array:
 
 def pose_to_pycolmap(pose: Array) -> pycolmap.Rigid3d:
     """COLMAP's pose of (7,) `qw qx qy qz px py pz`."""
-    pycolmap = colmap()
+    theirs = colmap()
     w, x, y, z = pose[:4]
-    rigid: pycolmap.Rigid3d = pycolmap.Rigid3d(pycolmap.Rotation3d(np.array([x, y, z, w])), pose[4:])
+    rigid: pycolmap.Rigid3d = theirs.Rigid3d(theirs.Rotation3d(np.array([x, y, z, w])), pose[4:])
     return rigid
 
 
@@ -129,8 +129,8 @@ def to_pycolmap(found: Reconstruction) -> pycolmap.Reconstruction:
     ModelError
         where COLMAP has no model for a lens.
     """
-    pycolmap = colmap()
-    made: pycolmap.Reconstruction = pycolmap.Reconstruction()
+    theirs = colmap()
+    made: pycolmap.Reconstruction = theirs.Reconstruction()
     models: Sequence[str | None] = found.models or [None] * len(found.cameras)
     for k, (camera, model) in enumerate(zip(found.cameras, models, strict=True)):
         made.add_camera_with_trivial_rig(camera_to_pycolmap(camera, k + 1, model))
@@ -138,7 +138,7 @@ def to_pycolmap(found: Reconstruction) -> pycolmap.Reconstruction:
     for view, name in enumerate(found.names):
         mine = np.flatnonzero(found.image_index == view)
         place[mine] = np.arange(len(mine))
-        image = pycolmap.Image(
+        image = theirs.Image(
             name=name,
             keypoints=pixels_to_colmap(found.pixels[mine]).reshape(-1, 2),
             camera_id=int(found.camera_of[view]) + 1,
@@ -148,7 +148,7 @@ def to_pycolmap(found: Reconstruction) -> pycolmap.Reconstruction:
     order = np.argsort(found.point_index, kind="stable")
     starts = np.searchsorted(found.point_index[order], np.arange(len(found.points) + 1))
     for k, point in enumerate(found.points):
-        track = pycolmap.Track()
+        track = theirs.Track()
         for row in order[starts[k] : starts[k + 1]]:
             track.add_element(int(found.image_index[row]) + 1, int(place[row]))
         made.add_point3D(point, track, found.colors[k])

@@ -20,4 +20,5 @@ def colmap() -> Any:
     import pycolmap
 
     pycolmap.logging.minloglevel = ERRORS_ONLY
+    pycolmap.logging.alsologtostderr = False
     return pycolmap

@@ -1,0 +1,114 @@
+"""Run structure from motion on pictures, and keep whatever came of it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vision3d.sfm import NoModelError, Reconstruction, SfmSettings, ViewGraph, reconstruct
+
+if TYPE_CHECKING:
+    from vision3d.sfm.view_graph import Loops
+
+__all__ = ["SfmDone", "SfmJob", "run_sfm"]
+
+
+@dataclass(frozen=True)
+class SfmJob:
+    """What is asked for.
+
+    Parameters
+    ----------
+    settings : of the reconstruction; a camera from a file is put in when it is read
+    camera : its file; None: the pictures calibrate it
+    which : camera in that file, where there are several
+    """
+
+    settings: SfmSettings = field(default_factory=SfmSettings)
+    camera: Path | None = None
+    which: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SfmDone:
+    """What came of it.
+
+    Parameters
+    ----------
+    sources : as they were named
+    job : with the camera that was read
+    found : the model; None where there is none
+    fault : why there is none, one sentence
+    missing : (name, reason) of pictures without a place
+    graph : which pictures were matched with which
+    seconds : the whole took
+    stopped : it was ended early
+    """
+
+    sources: tuple[str, ...]
+    job: SfmJob
+    found: Reconstruction | None
+    fault: str
+    missing: tuple[tuple[str, str], ...]
+    graph: ViewGraph | None
+    seconds: float
+    stopped: bool = False
+
+    @property
+    def given(self) -> int:
+        """Number of pictures that were named."""
+        return len(self.missing) + (0 if self.found is None else len(self.found))
+
+    @cached_property
+    def loops(self) -> Loops | None:
+        """Rotations round triangles of pairs."""
+        return None if self.graph is None else self.graph.loops()
+
+    @cached_property
+    def angles_rad(self) -> NDArray[np.float64]:
+        """(P,) largest triangulation angle of every point."""
+        from vision3d.sfm.geometry import triangulation_angles
+
+        return np.zeros(0) if self.found is None else triangulation_angles(self.found)
+
+
+def run_sfm(
+    sources: Sequence[str],
+    job: SfmJob,
+    *,
+    work: Path | None = None,
+    stop: threading.Event | None = None,
+    progress: Callable[[str, int, int], None] = lambda *_: None,
+) -> SfmDone:
+    """Reconstruct; that there is no model is a result too, which says why.
+
+    Raises
+    ------
+    DataError
+        where the pictures or the camera's file cannot be read.
+    Stopped
+        where the work was ended before there was a model.
+    """
+    began = time.perf_counter()
+    if job.camera is not None:
+        from vision3d.camera_files.reading import read_camera
+
+        camera = read_camera(job.camera, which=job.which)
+        job = replace(job, settings=replace(job.settings, camera=camera))
+    found, fault, graph = None, "", None
+    missing: tuple[tuple[str, str], ...] = ()
+    try:
+        found = reconstruct(sources, job.settings, work=work, stop=stop, progress=progress)
+        graph, missing = found.graph, found.missing
+    except NoModelError as error:
+        fault, graph, missing = str(error), error.graph, error.missing
+    stopped = stop is not None and stop.is_set()
+    return SfmDone(tuple(sources), job, found, fault, missing, graph, time.perf_counter() - began, stopped)

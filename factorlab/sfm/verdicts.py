@@ -1,0 +1,168 @@
+"""What a model of structure from motion is worth, in verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factorlab.report.document import Status, Verdict
+from factorlab.sfm.job import SfmDone
+from vision3d.sfm import Reconstruction
+
+__all__ = ["verdicts_of"]
+
+MOST = 0.7  # of the pictures that a useful model holds
+GOOD_ERROR, FAIR_ERROR = 1.0, 2.0  # px
+GOOD_ANGLE, FAIR_ANGLE = np.radians(4.0), np.radians(1.5)
+GOOD_TRACK, GOOD_SEEN = 2.5, 50
+FLAT = 0.02  # thickness over width of a cloud that is a plane
+LOOP_RAD, LOOPS_WRONG = np.radians(10.0), 0.1
+EXIF_OFF = 0.1  # relative difference to the focal length of EXIF that is worth a word
+MOST_NAMED = 6
+
+
+def verdicts_of(done: SfmDone) -> tuple[Verdict, ...]:
+    """In the order of a reader: pictures, those without a place, then the numbers."""
+    found = done.found
+    verdicts = [_registered(done), *_missing(done)]
+    if found is None:
+        return (*verdicts, *_turned_or_flat(done))
+    verdicts += [_error(found), _tracks(found), _angles(done), *_flat(done), *_weakest(found)]
+    verdicts += [*_loops(done), *_cameras(done)]
+    scale = "lengths are in no unit: one known distance, or two known places, would give it"
+    return (*verdicts, Verdict("scale", None, None, "INFO", scale))
+
+
+def _registered(done: SfmDone) -> Verdict:
+    placed = 0 if done.found is None else len(done.found)
+    unit = f"of {done.given}"
+    if done.found is None:
+        return Verdict("pictures with a place", 0, None, "FAIL", done.fault, "", unit)
+    status: Status = "PASS" if placed == done.given else "WARN" if placed >= MOST * done.given else "FAIL"
+    if done.stopped:
+        return Verdict(
+            "pictures with a place", placed, None, "WARN", "stopped before the end", "run it again", unit
+        )
+    meaning = "one model holds them all" if placed == done.given else "the rest is named below"
+    action = "" if status != "FAIL" else "take pictures that overlap more, a step apart"
+    return Verdict("pictures with a place", placed, None, status, meaning, action, unit)
+
+
+def _missing(done: SfmDone) -> list[Verdict]:
+    named = [Verdict("left out", name, None, "WARN", reason) for name, reason in done.missing[:MOST_NAMED]]
+    more = len(done.missing) - MOST_NAMED
+    if more > 0:
+        named.append(Verdict("left out", None, None, "WARN", f"{more} more: see the table of pictures"))
+    return named
+
+
+def _turned_or_flat(done: SfmDone) -> list[Verdict]:
+    """What pairs are, where no model grew."""
+    graph = done.graph
+    if graph is None or not (graph.inliers > 0).any():
+        return []
+    verified = int((graph.inliers > 0).sum())
+    kinds = {kind: graph.share_of(kind) for kind in ("general", "planar", "pure rotation", "flat or turned")}
+    told = ", ".join(f"{100.0 * share:.0f} % {kind}" for kind, share in kinds.items() if share > 0.0)
+    return [Verdict("pairs that match", verified, None, "INFO", told, "", f"of {len(graph.pairs)}")]
+
+
+def _judged(value: float, good: float, fair: float) -> Status:
+    """Larger is worse."""
+    return "PASS" if value <= good else "WARN" if value <= fair else "FAIL"
+
+
+def _error(found: Reconstruction) -> Verdict:
+    error = found.mean_error_px
+    status = _judged(error, GOOD_ERROR, FAIR_ERROR)
+    meaning = f"mean over points; RMS {found.rms_px:.3f} px, σ of a coordinate {found.sigma_px:.2f} px"
+    action = "" if status == "PASS" else "try --lens brown4, sharper pictures, or a calibrated --camera"
+    return Verdict("reprojection error", error, None, status, meaning, action, "px")
+
+
+def _tracks(found: Reconstruction) -> Verdict:
+    length = float(found.track_lengths.mean()) if len(found.points) else 0.0
+    status: Status = "PASS" if length >= GOOD_TRACK or len(found) == 2 else "WARN"
+    meaning = f"pictures see a point on the average; {len(found.points)} points, {len(found.pixels)} sights"
+    return Verdict(
+        "track length", length, None, status, meaning, "" if status == "PASS" else "overlap pictures more"
+    )
+
+
+def _angles(done: SfmDone) -> Verdict:
+    """Pure rotation, and a base too short for its distance, show here."""
+    angle = float(np.median(done.angles_rad)) if len(done.angles_rad) else 0.0
+    status: Status = "PASS" if angle >= GOOD_ANGLE else "WARN" if angle >= FAIR_ANGLE else "FAIL"
+    meaning = "median over points of the largest angle between two rays"
+    if status == "FAIL":
+        meaning = "the camera hardly moved for how far the points are: depth is guessed"
+    action = "" if status == "PASS" else "walk further between pictures instead of turning"
+    return Verdict("triangulation angle", float(np.degrees(angle)), None, status, meaning, action, "°")
+
+
+def _flat(done: SfmDone) -> list[Verdict]:
+    """A plane leaves the focal length open where it is not given."""
+    from vision3d.sfm.geometry import flatness
+
+    if done.found is None:
+        return []
+    share = flatness(done.found.points)
+    if share > FLAT:
+        return []
+    free = done.job.settings.camera is None
+    meaning = "all points lie in one plane" + (", which does not fix the focal length" if free else "")
+    action = "give --camera, or take in something that stands out" if free else ""
+    return [
+        Verdict(
+            "thickness of the cloud", 100.0 * share, None, "WARN" if free else "INFO", meaning, action, "%"
+        )
+    ]
+
+
+def _weakest(found: Reconstruction) -> list[Verdict]:
+    """Pictures that hang on few points."""
+    seen = found.observations_of
+    weak = [found.names[k] for k in np.flatnonzero(seen < GOOD_SEEN)]
+    if not weak:
+        return []
+    named = ", ".join(weak[:MOST_NAMED]) + (
+        f" and {len(weak) - MOST_NAMED} more" if len(weak) > MOST_NAMED else ""
+    )
+    return [
+        Verdict(
+            "fewest points in a picture", int(seen.min()), None, "WARN", f"below {GOOD_SEEN}: {named}",
+            "their poses are weak; add pictures between them and their neighbours",
+        )
+    ]  # fmt: skip
+
+
+def _loops(done: SfmDone) -> list[Verdict]:
+    """Rotations of three pairs that do not close: false matches, as repeated texture makes them."""
+    loops = done.loops
+    if loops is None or not len(loops):
+        return []
+    wrong = float(np.mean(loops.errors_rad > LOOP_RAD))
+    status: Status = "PASS" if wrong <= LOOPS_WRONG else "WARN"
+    meaning = f"median over {len(loops)} triangles of pairs; {100.0 * wrong:.0f} % above 10°"
+    action = (
+        "" if status == "PASS" else "some pairs match what only looks alike: repeated texture, or few points"
+    )
+    value = float(np.degrees(np.median(loops.errors_rad)))
+    return [Verdict("rotation round a loop", value, None, status, meaning, action, "°")]
+
+
+def _cameras(done: SfmDone) -> list[Verdict]:
+    """Focal lengths, and how EXIF or the file had them."""
+    found = done.found
+    if found is None:
+        return []
+    verdicts = []
+    for k, camera in enumerate(found.cameras):
+        metric = "focal length" if len(found.cameras) == 1 else f"focal length of camera {k + 1}"
+        value = float(camera.intrinsics[:2].mean())
+        if done.job.settings.camera is not None:
+            verdicts.append(Verdict(metric, value, None, "INFO", "as given", unit="px"))
+            continue
+        across = 2.0 * np.degrees(np.arctan(0.5 * camera.size[0] / value))
+        meaning = f"from the pictures ({camera.lens}); they see {across:.0f}° across"
+        verdicts.append(Verdict(metric, value, None, "INFO", meaning, unit="px"))
+    return verdicts if len(verdicts) <= MOST_NAMED else verdicts[:MOST_NAMED]
