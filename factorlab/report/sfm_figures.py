@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from factorlab.report.camera_figures import frame_axes
-from factorlab.report.style import WIDTH, blank, legend_below
+from factorlab.report.style import WIDTH, blank, legend_below, log_axis
 from sequential.manifold.quaternion import quaternion_inverse, quaternion_multiply
 from vision3d.sfm import Reconstruction, ViewGraph
 from vision3d.sfm.geometry import upright
