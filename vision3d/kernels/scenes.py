@@ -8,7 +8,7 @@ A scene is a table (P, COLUMNS) of shapes, a row each:
     15-18   the window of the material that covers it: u0, v0, width, height, as shares of the material
     19      the row of its material in `levels`
 
-A material is a pyramid of pictures (`levels` (M, L, 3): where in `texels` each begins, its width, its height),
+A material is a pyramid of pictures (`levels` (M, L, 3): where in `texels` each begins, its width and height),
 each level half the size of the one before, so that what is far away is a mean and not a random sample.  A
 rectangle shows its window edge to edge, x to the right and y down as seen from its negative z (mirrored from
 behind).  A sphere shows it six times a third of the way round, as the faces of a cube blown up.
@@ -22,7 +22,7 @@ import numpy as np
 from numba import types
 
 from vision3d.kernels import inlined, kernel
-from vision3d.kernels.arrays import b0, f0, f1, f2, f3, w1
+from vision3d.kernels.arrays import f0, f1, f2, f3, w1
 
 __all__ = ["COLUMNS", "RECTANGLE", "SPHERE", "cast", "photograph", "reaches"]
 
@@ -161,15 +161,13 @@ def shaded(s, levels, texels, px, py, pz, dx, dy, dz, spread, light, ambient):
     return value * (ambient + (1.0 - ambient) * towards)
 
 
-@kernel(types.void(f2, i3, g1, f2, f1, f3, f2, f1, f0, f0, b0, w_single))
-def photograph(
-    shapes, levels, texels, tints, origin, rays, samples, light, ambient, background, sharp, image
-):
+@kernel(types.void(f2, i3, g1, f2, f1, f3, f2, f1, f0, f0, w_single))
+def photograph(shapes, levels, texels, tints, origin, rays, samples, light, ambient, background, image):
     """Fill image (h, w, C) with what falls on each pixel.
 
     `rays` (h + 1, w + 1, 3) in the world go through the corners of the pixels; `samples` (n, 2) lie in the
     unit square; `tints` (P, C) is what a shape's radiance becomes in each channel; `light` is the unit vector
-    along which light travels; `sharp` takes every sample from the finest level.
+    along which light travels.
     """
     height, width, channels = image.shape
     ox, oy, oz = origin[0], origin[1], origin[2]
@@ -209,7 +207,7 @@ def photograph(
                     continue
                 s = shapes[found]
                 px, py, pz = ox + t * dx - s[10], oy + t * dy - s[11], oz + t * dz - s[12]
-                spread = 0.0 if sharp else wide * t * across
+                spread = wide * t * across
                 value = shaded(s, levels, texels, px, py, pz, dx, dy, dz, spread, light, ambient)
                 for c in range(channels):
                     total[c] += value * tints[found, c]

@@ -1,4 +1,4 @@
-"""Rendered truth: photographs of boards, markers, lines and whole scenes by a camera that is known exactly."""
+"""Rendered truth: photographs of boards, markers, lines and scenes by a camera that is known exactly."""
 
 from vision3d.render.ground import GroundLine, RobotView, drive, line_pixels, random_line, render_ground
 from vision3d.render.material import Material, bricks, leaves, photograph, plain, speckles

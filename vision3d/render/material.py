@@ -4,7 +4,8 @@
     poster = photograph(read_image("poster.png"))
 
 Leaves of power-law sizes look the same from near and from far, as photographs of the world do, and give
-detectors corners and blobs at every scale (Lee, Mumford and Huang 2001, "Occlusion models for natural images").
+detectors corners and blobs at every scale (Lee, Mumford and Huang 2001, "Occlusion models for natural
+images").
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class Material:
 
 
 def photograph(image: ArrayLike) -> Material:
-    """A photograph as a material; grey levels (h, w) or BGR (h, w, 3) of 8 bits, or reflectance 0-1 (h, w)."""
+    """A photograph as a material: grey (h, w) or BGR (h, w, 3) of 8 bits, or reflectance 0-1 (h, w)."""
     given = np.asarray(image)
     if given.ndim == 3 and given.shape[2] == 3:
         given = (given @ np.array([0.114, 0.587, 0.299])).round().astype(given.dtype)

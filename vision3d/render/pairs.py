@@ -1,4 +1,4 @@
-"""Two photographs of one scene, taken at once: a stereo pair with its disparity, and what only one eye sees."""
+"""Two photographs of one scene, taken at once: a stereo pair, its disparity, and what one eye only sees."""
 
 from __future__ import annotations
 

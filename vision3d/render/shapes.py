@@ -26,8 +26,8 @@ class Shape:
     Attributes
     ----------
     kind : "rectangle" or "sphere"
-    world_T_shape : (7,) of its middle; a rectangle lies in the plane z = 0, x to the right and y down, and its
-        picture is seen from negative z
+    world_T_shape : (7,) of its middle; a rectangle lies in the plane z = 0, x to the right and y down, its
+        picture seen from negative z
     size_m : width and height, or a sphere's diameter twice
     material : what covers it
     window : u0, v0, width, height: the part of the material it shows, as shares; more than 1 repeats it
@@ -46,9 +46,7 @@ class Shape:
     def __post_init__(self) -> None:
         pose = np.array(self.world_T_shape, dtype=np.float64)
         if pose.shape != (7,) or not np.isfinite(pose).all():
-            raise ShapeError(
-                f"world_T_shape must be seven finite numbers, qw qx qy qz px py pz; got {self.world_T_shape!r}"
-            )
+            raise ShapeError(f"world_T_shape must be seven finite numbers, qw qx qy qz px py pz, got {pose}")
         if not min(self.size_m) > 0.0:
             raise ModelError(f"the size of a shape must be positive, got {self.size_m} m")
         pose.setflags(write=False)

@@ -182,7 +182,7 @@ def _radiance(
     light = np.array(scene.light) / np.linalg.norm(scene.light)
     photograph(
         scene.table, *scene.pyramids, tints, world_T_camera[4:].copy(), rays, _lattice(supersample**2),
-        light, scene.ambient, scene.background, False, image,
+        light, scene.ambient, scene.background, image,
     )  # fmt: skip
     return image
 
@@ -220,7 +220,7 @@ def cast_rays(scene: Scene, origin: ArrayLike, rays: ArrayLike) -> tuple[Array, 
 
 
 def is_seen(camera: Camera, camera_T_world: ArrayLike, scene: Scene, points: ArrayLike) -> NDArray[np.bool_]:
-    """Whether points (N, 3) of the scene's surface appear in the image: inside it, and nothing before them."""
+    """Whether points (N, 3) of the scene's surface appear in the image, with nothing before them."""
     from vision3d.kernels.scenes import reaches
 
     pose = _pose(camera_T_world)
