@@ -1,6 +1,16 @@
 """Rendered truth: photographs of boards, markers, lines and scenes by a camera that is known exactly."""
 
 from vision3d.render.ground import GroundLine, RobotView, drive, line_pixels, random_line, render_ground
+from vision3d.render.journeys import (
+    forward_poses,
+    looking_at,
+    observe,
+    orbit_poses,
+    render_journey,
+    scene_points,
+    sideways_poses,
+    turning_poses,
+)
 from vision3d.render.material import Material, bricks, leaves, photograph, plain, speckles
 from vision3d.render.pairs import StereoView, render_stereo, transfer
 from vision3d.render.patterns import (
@@ -47,29 +57,37 @@ __all__ = [
     "desk",
     "distance_field",
     "drive",
+    "forward_poses",
     "ground",
     "is_seen",
     "leaves",
     "line_pixels",
+    "looking_at",
     "marker_corners",
     "marker_texture",
     "moving_board",
     "moving_markers",
+    "observe",
+    "orbit_poses",
     "photograph",
     "picture",
     "plain",
     "random_line",
     "rectangle",
     "render_ground",
+    "render_journey",
     "render_planes",
     "render_scene",
     "render_set",
     "render_stereo",
     "repeated_wall",
+    "scene_points",
+    "sideways_poses",
     "speckles",
     "sphere",
     "surface_points",
     "transfer",
+    "turning_poses",
     "wall",
     "write_video",
 ]
