@@ -2,6 +2,14 @@
 
 from factorlab.graph.attitude import AttitudeGraph
 from factorlab.graph.batch import BatchGraph
+from factorlab.graph.bundle import BundleResult, bundle_adjust
 from factorlab.graph.incremental import FixedLagGraph, IncrementalGraph
 
-__all__ = ["AttitudeGraph", "BatchGraph", "FixedLagGraph", "IncrementalGraph"]
+__all__ = [
+    "AttitudeGraph",
+    "BatchGraph",
+    "BundleResult",
+    "FixedLagGraph",
+    "IncrementalGraph",
+    "bundle_adjust",
+]
