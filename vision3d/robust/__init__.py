@@ -4,11 +4,14 @@ found = fit_homography(pixels_a, pixels_b, RansacSettings(threshold=3.0))
 found.model, found.cov, found.inliers, found.stopped          # "confidence reached" after found.iterations
 """
 
+from vision3d.robust.flats import fit_line, fit_plane
+from vision3d.robust.fundamental import eight_point, epipolar_distances, fit_fundamental
 from vision3d.robust.homography import fit_homography, transfer, transfer_cov
 from vision3d.robust.model import Addresses, CompiledModel, NumpyModel, RobustModel
 from vision3d.robust.result import RobustFit
 from vision3d.robust.search import fit
 from vision3d.robust.settings import RansacSettings
+from vision3d.robust.similarity import fit_similarity
 
 __all__ = [
     "Addresses",
@@ -17,8 +20,14 @@ __all__ = [
     "RansacSettings",
     "RobustFit",
     "RobustModel",
+    "eight_point",
+    "epipolar_distances",
     "fit",
+    "fit_fundamental",
     "fit_homography",
+    "fit_line",
+    "fit_plane",
+    "fit_similarity",
     "transfer",
     "transfer_cov",
 ]

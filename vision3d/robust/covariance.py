@@ -17,11 +17,13 @@ def pseudo_inverse(information: Array, null: Array) -> Array:
     NaN where the information is singular on that space too: the data leave the model undetermined.
     """
     mean = float(np.trace(information)) / len(information)
-    whole = information + mean * null.T @ null
+    along = null.T @ null
+    across = np.eye(len(information)) - along
+    whole = across @ information @ across + mean * along
     values, vectors = np.linalg.eigh(whole)
     if not values[0] > SINGULAR * values[-1]:
         return np.full(information.shape, np.nan)
-    return np.asarray((vectors / values) @ vectors.T - null.T @ null / mean)
+    return np.asarray((vectors / values) @ vectors.T - along / mean)
 
 
 def unit_norm(model: Array, cov: Array) -> tuple[Array, Array]:

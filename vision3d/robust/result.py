@@ -28,6 +28,7 @@ class RobustFit:
     score : mean of the truncated squared errors over threshold²: 0 is perfect, 1 says that nothing agrees
     threshold : that was applied
     backend : who searched: "own", "opencv RANSAC", "poselib" …
+    note : what a reader should know of the data, as that they leave the model open; mostly empty
     """
 
     model: Array
@@ -40,6 +41,7 @@ class RobustFit:
     score: float
     threshold: float
     backend: str = "own"
+    note: str = ""
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from vision3d.robust.model import RobustModel
 from vision3d.robust.result import RobustFit
 from vision3d.robust.settings import DEFAULT, RansacSettings
 
-__all__ = ["Found", "assess", "fit", "relative_weights", "result_of", "search"]
+__all__ = ["Found", "assess", "fit", "refined", "relative_weights", "result_of", "search"]
 
 Array = NDArray[np.float64]
 MEDIAN = {1: 0.4549364, 2: 1.3862944, 3: 2.3659739}  # of chi squared, by degrees of freedom
@@ -72,7 +72,7 @@ def fit(
     return result_of(found, found.model, unknown)
 
 
-def result_of(found: Found, model: Array, cov: Array, *, scale: float = 1.0) -> RobustFit:
+def result_of(found: Found, model: Array, cov: Array, *, scale: float = 1.0, note: str = "") -> RobustFit:
     """The result, with errors multiplied by scale: the unit of the data over that of the search."""
     inliers = found.errors2 < found.threshold2
     cost = np.where(inliers, found.errors2 / found.threshold2, 1.0)
@@ -87,6 +87,7 @@ def result_of(found: Found, model: Array, cov: Array, *, scale: float = 1.0) -> 
         score=float(cost.mean()),
         threshold=scale * float(np.sqrt(found.threshold2)),
         backend=found.backend,
+        note=note,
     )
 
 
@@ -147,6 +148,22 @@ def search(
         sigma2 = polish(addresses, rows, weights, threshold2, model.error_dof, blend, best, errors, share)
     sigma2 *= _spare(model, errors, threshold2)
     return Found(best, errors, share, sigma2, threshold2, int(told[0]), REASONS[code])
+
+
+def refined(model: RobustModel, data: Array, settings: RansacSettings, weights: Array, found: Found) -> Found:
+    """The last fit again, from the model that `found` now holds; the rest of what it tells stays."""
+    from vision3d.kernels.robust_local import polish
+
+    rows, best = checked_rows(model, data), found.model.copy()
+    errors, share = np.empty(len(rows)), np.empty(len(rows))
+    blend = settings.refine == "mixture"
+    with model.functions() as f:
+        addresses = np.array([f.solve, f.residuals, f.fit], np.int64)
+        sigma2 = polish(
+            addresses, rows, weights, found.threshold2, model.error_dof, blend, best, errors, share
+        )
+    sigma2 *= _spare(model, errors, found.threshold2)
+    return replace(found, model=best, errors2=errors, weights=share, sigma2=sigma2)
 
 
 def assess(
