@@ -138,6 +138,6 @@ class StereoCalibration:
         """Number of the picture of one side (0 left, 1 right) of a pair."""
         return self.pictures.index((side, pair))
 
-    def weights_of(self, side: int, pair: int) -> Array:
-        """Weights (N,) of the corners of a picture."""
-        return self.weights[self.picture(side, pair)]
+    def weights_of_pair(self, pair: int) -> tuple[Array, Array]:
+        """Weights (N,) of the corners of the left and of the right picture of a pair that both cameras saw."""
+        return self.weights[self.picture(0, pair)], self.weights[self.picture(1, pair)]
