@@ -139,5 +139,5 @@ class StereoCalibration:
         return self.pictures.index((side, pair))
 
     def weights_of_pair(self, pair: int) -> tuple[Array, Array]:
-        """Weights (N,) of the corners of the left and of the right picture of a pair that both cameras saw."""
+        """Weights (N,) of the corners of either picture of a pair that both cameras saw."""
         return self.weights[self.picture(0, pair)], self.weights[self.picture(1, pair)]

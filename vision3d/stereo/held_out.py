@@ -120,9 +120,7 @@ def _judged(
         pair_rms[v, side] = np.sqrt(np.mean(own))
     rectified = rectify(calibration.rig, size=calibration.rig.left.size)
     train = [
-        row_errors_of(
-            rectified, calibration.pairs[v], (calibration.weights_of(0, v), calibration.weights_of(1, v))
-        )
+        row_errors_of(rectified, calibration.pairs[v], calibration.weights_of_pair(v))
         for v in calibration.whole
     ]
     poses = np.array([rig.right_T_left for rig in rigs])
