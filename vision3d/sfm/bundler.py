@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import FileFormatError
-from sequential.manifold.quaternion import quaternion_from_matrix, rotation_matrix
+from sequential.manifold.quaternion import quaternion_from_matrix
 from vision3d.camera import Camera
 from vision3d.sfm.bal import radial_camera
+from vision3d.sfm.bundler_file import bundler_list, bundler_text
 from vision3d.sfm.reconstruction import Reconstruction
 
 __all__ = ["read_bundler", "write_bundler"]
@@ -89,32 +90,12 @@ def write_bundler(path: Path | str, reconstruction: Reconstruction) -> Path:
     ModelError
         for a lens that the format cannot say: it has one focal length and two radial coefficients.
     """
-    r, path = reconstruction, Path(path)
-    intrinsics = np.array([radial_camera(camera) for camera in r.cameras]).reshape(-1, 5)
-    lines = [HEADER, f"{len(r.names)} {len(r.points)}"]
-    turns = FLIP[:, None] * rotation_matrix(r.cameras_T_world[:, :4])
-    for c, R, t in zip(r.camera_of, turns, FLIP * r.cameras_T_world[:, 4:], strict=True):
-        lines += [_row(row) for row in (intrinsics[c, :3], *R, t)]
-    pixels = (r.pixels - intrinsics[r.camera_of[r.image_index], 3:]) * (1.0, -1.0)
-    order = np.argsort(r.point_index, kind="stable")
-    starts = np.searchsorted(r.point_index[order], np.arange(len(r.points) + 1))
-    key = np.zeros(len(r.names), dtype=np.int64)
-    for j, (point, color) in enumerate(zip(r.points, r.colors, strict=True)):
-        lines += [_row(point), " ".join(str(int(value)) for value in color)]
-        seen = [str(starts[j + 1] - starts[j])]
-        for k in order[starts[j] : starts[j + 1]]:
-            i = r.image_index[k]
-            # Bundler counts the features of every image; here those that have a point
-            seen.append(f"{i} {key[i]} {_row(pixels[k])}")
-            key[i] += 1
-        lines.append(" ".join(seen))
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-    path.with_name("list.txt").write_text("\n".join(r.names) + "\n", encoding="utf-8")
+    path = Path(path)
+    for camera in reconstruction.cameras:
+        radial_camera(camera)
+    path.write_text(bundler_text(reconstruction), encoding="ascii")
+    path.with_name("list.txt").write_text(bundler_list(reconstruction), encoding="utf-8")
     return path
-
-
-def _row(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 def _numbers(path: Path) -> tuple[Array, int, int]:
