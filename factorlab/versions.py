@@ -8,7 +8,7 @@ from importlib import metadata
 __all__ = ["LIBRARIES", "versions"]
 
 LIBRARIES = (
-    "numpy", "scipy", "numba", "gtsam", "opencv-python-headless", "matplotlib", "click", "jinja2",
+    "numpy", "scipy", "numba", "gtsam", "opencv-python-headless", "pycolmap", "matplotlib", "click", "jinja2",
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from factorlab.cli.attitude import attitude
 from factorlab.cli.calibrate import calibrate
 from factorlab.cli.camera import camera
 from factorlab.cli.characterize import characterize
+from factorlab.cli.cloud import cloud
 from factorlab.cli.compare import compare
 from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
@@ -68,6 +69,7 @@ for command in (
     markers,
     objects,
     sfm,
+    cloud,
     sheet,
     info,
     doctor,

@@ -46,7 +46,7 @@ def _places() -> dict[str, str]:
     folder = data or "not set: mrclam is not available"
     if data and not Path(data).is_dir():
         folder = f"{data} is not a folder"
-    return {"kitti, plaza": wheel, "FACTORLAB_DATA": folder, **_boards()}
+    return {"kitti, plaza": wheel, "FACTORLAB_DATA": folder, **_boards(), **_peers()}
 
 
 def _boards() -> dict[str, str]:
@@ -63,3 +63,11 @@ def _boards() -> dict[str, str]:
         )
     port = version_of("pyserial", "")
     return {**found, "serial ports": f"pyserial {port}" if port else "pip install 'factorlab[live]'"}
+
+
+def _peers() -> dict[str, str]:
+    """Packages that some commands can use besides, and what brings them."""
+    from factorlab.versions import version_of
+
+    extras = {"open3d": "cloud", "poselib": "poselib"}
+    return {name: version_of(name, f"pip install 'factorlab[{extra}]'") for name, extra in extras.items()}

@@ -26,7 +26,7 @@ from vision3d.cloud.normals import estimate_normals
 from vision3d.cloud.with_open3d import open3d
 from vision3d.rigid import transform
 
-__all__ = ["IcpResult", "icp"]
+__all__ = ["IcpResult", "Method", "icp"]
 
 Method = Literal["point-to-plane", "point-to-point"]
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
