@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sequential.errors import DataError
 from vision3d.images import ImageSet, LeftOut, read_images
 
-__all__ = ["VIDEO_SUFFIXES", "held_pictures", "open_pictures", "sharpest_frames"]
+__all__ = ["VIDEO_SUFFIXES", "held_pictures", "open_pictures", "sharpest_frames", "sharpness"]
 
 Picture = NDArray[np.uint8]
 VIDEO_SUFFIXES = frozenset(
@@ -73,9 +73,9 @@ def sharpest_frames(path: Path, count: int, name: str) -> ImageSet:
             if frame.index % step:
                 continue
             place = int(frame.index / stretch)
-            sharpness = _sharpness(frame.grey)
-            if place not in best or sharpness > best[place][0]:
-                best[place] = (sharpness, f"{name} frame {frame.index}", frame.grey)
+            value = sharpness(frame.grey)
+            if place not in best or value > best[place][0]:
+                best[place] = (value, f"{name} frame {frame.index}", frame.grey)
         left_out = (LeftOut(name, source.fault),) if source.fault else ()
         size = source.size
     images = [(called, image) for _, called, image in best.values()]
@@ -83,7 +83,7 @@ def sharpest_frames(path: Path, count: int, name: str) -> ImageSet:
     return ImageSet(tuple(images[::step]), size, left_out)
 
 
-def _sharpness(image: Picture) -> float:
+def sharpness(image: Picture) -> float:
     """Variance of the Laplacian at half the size, where noise counts less."""
     import cv2
 

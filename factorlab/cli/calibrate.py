@@ -23,6 +23,11 @@ COMMANDS = {
         "camera",
         "Camera, from pictures of a checkerboard, ChArUco or circles.",
     ),
+    "stereo": (
+        "factorlab.cli.calibrate_stereo",
+        "stereo",
+        "Two cameras and their pose, from pairs of pictures of a board.",
+    ),
     "ferraris": ("factorlab.cli.calibrate_field", "ferraris", "Six positions and three known turns."),
 }
 

@@ -15,8 +15,9 @@ from factorlab.cli.settings import Command, as_json, check_option, command_line,
 
 if TYPE_CHECKING:
     from factorlab.camera import CameraSettings
+    from vision3d.boards import Board
 
-__all__ = ["camera"]
+__all__ = ["KINDS", "LENSES", "board_of", "camera"]
 
 KINDS = ("checkerboard", "charuco", "circles", "acircles", "markers")
 LENSES = ("auto", "pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "thin12", "fisheye4")
@@ -96,24 +97,11 @@ def camera(sources: tuple[str, ...], **options: Any) -> int:
 
 
 def _settings(options: dict[str, Any]) -> CameraSettings:
-    """The board and the rest; what is wrong with the board's options is the command line's fault."""
+    """The board and the rest."""
     from factorlab.camera import CameraSettings
-    from sequential.errors import FactorlabError
-    from vision3d.boards import board_from_text
 
-    if options["kind"] not in ("charuco", "markers"):
-        for name in ("marker", "dictionary"):
-            if options[name] is not None:
-                raise click.UsageError(f"--{name} goes with --kind charuco or markers")
-    try:
-        board = board_from_text(
-            options["board_text"], kind=options["kind"], square=options["square"],
-            marker=options["marker"], dictionary=options["dictionary"] or "4x4_50",
-        )  # fmt: skip
-    except FactorlabError as error:
-        raise click.BadParameter(str(error), param_hint="--board") from error
     return CameraSettings(
-        board=board,
+        board=board_of(options),
         lens=options["lens"],
         window=options["window"],
         robust=not options["all_corners"],
@@ -122,3 +110,27 @@ def _settings(options: dict[str, Any]) -> CameraSettings:
         compare=options["compare"],
         next_pose=options["next_pose"],
     )
+
+
+def board_of(options: dict[str, Any]) -> Board:
+    """The board of --board, --square, --kind, --marker and --dictionary.
+
+    Raises
+    ------
+    click.UsageError
+        where they do not go together: that is the command line's fault.
+    """
+    from sequential.errors import FactorlabError
+    from vision3d.boards import board_from_text
+
+    if options["kind"] not in ("charuco", "markers"):
+        for name in ("marker", "dictionary"):
+            if options[name] is not None:
+                raise click.UsageError(f"--{name} goes with --kind charuco or markers")
+    try:
+        return board_from_text(
+            options["board_text"], kind=options["kind"], square=options["square"],
+            marker=options["marker"], dictionary=options["dictionary"] or "4x4_50",
+        )  # fmt: skip
+    except FactorlabError as error:
+        raise click.BadParameter(str(error), param_hint="--board") from error
