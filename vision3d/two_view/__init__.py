@@ -1,0 +1,27 @@
+"""Two pictures: the motion between them, what it is known from, and where a point of one lies in the other.
+
+view = estimate_two_view(camera_a, camera_b, pixels_a, pixels_b)
+"""
+
+from vision3d.two_view.estimate import estimate_two_view
+from vision3d.two_view.motion import (
+    decompose_essential,
+    essential_matrix,
+    local_motion,
+    recover_pose,
+    retract_motion,
+)
+from vision3d.two_view.planes import decompose_homography, plane_homography
+from vision3d.two_view.result import TwoView
+
+__all__ = [
+    "TwoView",
+    "decompose_essential",
+    "decompose_homography",
+    "essential_matrix",
+    "estimate_two_view",
+    "local_motion",
+    "plane_homography",
+    "recover_pose",
+    "retract_motion",
+]
