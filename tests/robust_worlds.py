@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from vision3d.robust import epipolar_distances
+
 HOMOGRAPHY = np.array([[1.0, 0.1, 5.0], [0.02, 0.9, -3.0], [1e-4, 0.0, 1.0]])
 SIZE_PX = 640.0
 
@@ -66,3 +68,8 @@ def fundamental_matches(rng, inliers, count=500, sigma_px=0.7, plane=0.0):
     wrong = rng.random(count) > inliers
     noisy_b[wrong] = rng.uniform([0.0, 0.0], [640.0, 480.0], (int(wrong.sum()), 2))
     return TwoViews(noisy_a, noisy_b, ~wrong, a[~wrong], b[~wrong], F / np.linalg.norm(F))
+
+
+def off_lines_px(F, world):
+    """Root mean square distance of the exact matches from their epipolar lines."""
+    return float(np.sqrt(np.mean(np.square(epipolar_distances(F, world.exact_a, world.exact_b)))))

@@ -1,9 +1,7 @@
-"""Making a model better than the sample it came from: local optimisation, and the last fit of all.
+"""Making a model better than the sample it came from: local optimisation.
 
 Reweighted least squares on the rows that agree, within a limit that narrows to the threshold, and the same
 from random subsets of them (Chum, Matas, Kittler 2003, "Locally optimized RANSAC"; Lebeda, Matas, Chum 2012).
-At the end the errors are taken for a mixture of Gaussian noise of unknown sigma and of chance agreement, and
-each row weighs as probably as it is of the first kind.
 """
 
 from __future__ import annotations
@@ -19,13 +17,10 @@ from vision3d.kernels.robust_calls import call, pointer
 from vision3d.kernels.robust_sampling import draw
 from vision3d.kernels.robust_scoring import errors_of, score
 
-__all__ = ["climb", "inner_samples", "polish"]
+__all__ = ["climb", "inner_samples"]
 
 wi1, wu1 = types.int64[::1], types.uint64[::1]
 WIDEST, STEPS = 9.0, 4  # the limit begins at three thresholds
-ROUNDS, SETTLED = 30, 1e-10
-BLENDED = 0.16  # (sigma / threshold)² up to which noise can be told from chance
-EVER = 1e-4  # share of chance agreement that is never ruled out
 
 
 @inlined
@@ -99,80 +94,3 @@ def inner_samples(
             model[:] = trial
             better += 1
     return better
-
-
-@inlined
-def noise_step(errors, weights, threshold2, dof, sigma2, noise, share):
-    """One step of expectation and maximisation: fills share, returns sigma² and the share of noise."""
-    n = errors.shape[0]
-    room = 2.0 * math.sqrt(threshold2) if dof == 1 else math.pi * threshold2
-    if dof == 3:
-        room = 4.0 / 3.0 * math.pi * threshold2**1.5
-    peak = noise * (2.0 * math.pi * sigma2) ** (-0.5 * dof)
-    floor = (1.0 - noise) / room
-    total, squares, inside = 0.0, 0.0, 0
-    for i in range(n):
-        share[i] = 0.0
-        if errors[i] < threshold2:
-            likely = peak * math.exp(-0.5 * errors[i] / sigma2)
-            part = likely / (likely + floor)
-            total += part
-            squares += part * errors[i]
-            inside += 1
-            share[i] = part * weights[i]
-    if not total > 0.0:
-        return 0.0, 0.0
-    return squares / (dof * total), min(total / inside, 1.0 - EVER)
-
-
-@inlined
-def weigh(errors, weights, threshold2, share):
-    """Fill share with the weights of the rows that agree; returns the sum of their errors and how many."""
-    squares, agree = 0.0, 0
-    for i in range(errors.shape[0]):
-        inside = errors[i] < threshold2
-        share[i] = weights[i] if inside else 0.0
-        squares += errors[i] if inside else 0.0
-        agree += 1 if inside else 0
-    return squares, agree
-
-
-@kernel(f0(i1, f2, f1, f0, i0, b0, w1, w1, w1))
-def polish(functions, data, weights, threshold2, dof, blend, model, errors, share):
-    """The last fit, which leaves errors and share of the model: returns sigma² of an error's component.
-
-    Truncated least squares until it settles; then, with `blend` and where the noise is well within the
-    threshold, the mixture.
-    """
-    n, k = data.shape
-    trial = model.copy()
-    best = math.inf
-    for _ in range(ROUNDS):
-        errors_of(functions[1], data, weights, trial, errors)
-        squares, agree = weigh(errors, weights, threshold2, share)
-        cost = squares + (n - agree) * threshold2
-        if not cost < best * (1.0 - SETTLED):
-            break
-        best = cost
-        model[:] = trial
-        if call(functions[2], pointer(data, 0), n, k, pointer(share, 0), pointer(trial, 0)) < 1:
-            break
-    errors_of(functions[1], data, weights, model, errors)
-    squares, agree = weigh(errors, weights, threshold2, share)
-    sigma2 = squares / (dof * max(agree, 1))
-    if not blend or not 0.0 < sigma2 < BLENDED * threshold2:
-        return sigma2
-    noise = 1.0 - 10.0 * EVER
-    trial[:] = model
-    for _ in range(ROUNDS):
-        before = sigma2
-        sigma2, noise = noise_step(errors, weights, threshold2, dof, sigma2, noise, share)
-        if not sigma2 > 0.0:
-            break
-        if call(functions[2], pointer(data, 0), n, k, pointer(share, 0), pointer(trial, 0)) < 1:
-            break
-        errors_of(functions[1], data, weights, trial, errors)
-        model[:] = trial
-        if abs(sigma2 - before) < 1e-5 * before:
-            break
-    return sigma2

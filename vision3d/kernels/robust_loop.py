@@ -183,6 +183,7 @@ def robust_loop(data, weights, functions, sizes, options, seed, model, errors, t
                 lost, wald(max(share_of_sample, FEWEST), bad_agree / bad_rows, sizes[SOLVE_COST], test)
             )
             needed = enough_trials(errors, threshold2, m, confidence, lost, growing)
+            needed = 0.0 if most == n else needed
     told[0], told[1], told[2] = trial, best, most
     if not best < math.inf:
         return NONE_FOUND

@@ -4,6 +4,7 @@ found = fit_homography(pixels_a, pixels_b, RansacSettings(threshold=3.0))
 found.model, found.cov, found.inliers, found.stopped          # "confidence reached" after found.iterations
 """
 
+from vision3d.robust.compare import BackendRow, compare_backends, table_of
 from vision3d.robust.flats import fit_line, fit_plane
 from vision3d.robust.fundamental import eight_point, epipolar_distances, fit_fundamental
 from vision3d.robust.homography import fit_homography, transfer, transfer_cov
@@ -15,11 +16,13 @@ from vision3d.robust.similarity import fit_similarity
 
 __all__ = [
     "Addresses",
+    "BackendRow",
     "CompiledModel",
     "NumpyModel",
     "RansacSettings",
     "RobustFit",
     "RobustModel",
+    "compare_backends",
     "eight_point",
     "epipolar_distances",
     "fit",
@@ -28,6 +31,7 @@ __all__ = [
     "fit_line",
     "fit_plane",
     "fit_similarity",
+    "table_of",
     "transfer",
     "transfer_cov",
 ]

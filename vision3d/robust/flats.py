@@ -116,7 +116,7 @@ def _fit_flat(
     rows = np.ascontiguousarray((given - middle) / scale)
     inside = replace(settings, threshold=settings.threshold / scale)
     found = search(model, rows, inside, relative_weights(sigma, len(rows)), rng)
-    sigma2 = found.sigma2 if sigma is None else (float(np.median(sigma)) / scale) ** 2
+    sigma2 = found.variance(sigma, scale)
     normal, offset = found.model[:-1], scale * found.model[-1] + found.model[:-1] @ middle
     side = -1.0 if offset < 0.0 else 1.0
     cov = _covariance(given - middle, found.weights, normal, middle, scale**2 * sigma2)

@@ -99,7 +99,7 @@ def fit_fundamental(
         outside, note = search_outside("fundamental", a, b, settings, rng), ""
         F = np.linalg.inv(to_b).T @ outside.model @ np.linalg.inv(to_a)
         found = assess(FUNDAMENTAL, rows, inside, weights, F.ravel() / np.linalg.norm(F), outside)
-    sigma2 = found.sigma2 if sigma is None else (float(np.median(sigma)) / scale) ** 2
+    sigma2 = found.variance(sigma, scale)
     change = np.kron(to_b.T, to_a.T)
     F, cov = unit_norm(change @ found.model, change @ (sigma2 * _covariance(rows, found)) @ change.T)
     return result_of(found, F.reshape(3, 3), cov, scale=scale, note=note)

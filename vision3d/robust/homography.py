@@ -81,7 +81,7 @@ def fit_homography(
         outside = search_outside("homography", a, b, settings, rng)
         start = _facing(to_b @ outside.model @ np.linalg.inv(to_a), rows)
         found = assess(HOMOGRAPHY, rows, inside, weights, start.ravel(), outside)
-    sigma2 = found.sigma2 if sigma is None else (float(np.median(sigma)) / scale) ** 2
+    sigma2 = found.variance(sigma, scale)
     cov = sigma2 * _inverse_information(rows, found)
     change = np.kron(from_b, to_a.T)
     H, cov = unit_norm(change @ found.model, change @ cov @ change.T)

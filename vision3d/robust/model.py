@@ -124,9 +124,11 @@ class NumpyModel(RobustModel):
             form(guarded(self._fit)),
         )
         solve, residuals, fit = (int(ctypes.cast(f, ctypes.c_void_p).value or 0) for f in kept)
-        yield Addresses(solve, residuals, fit if self.fit else 0)
-        if failures:
-            raise failures[0]
+        try:
+            yield Addresses(solve, residuals, fit if self.fit else 0)
+        finally:
+            if failures:
+                raise failures[0]
 
     def _solve(self, data: Any, n: int, k: int, sample: Any, out: Any) -> int:
         chosen = _seen(data, (n, k))[_seen(sample, (self.sample_size,))]

@@ -42,7 +42,7 @@ def paired_points(a: Array, b: Array, columns: int, fewest: int, model: str) -> 
     if len(first) < fewest:
         raise DataError(f"a {model} takes {fewest} matches or more; got {len(first)}")
     for name, points in (("a", first), ("b", second)):
-        if not spread(points) > 0.0:
+        if (points == points[0]).all():
             raise UnderConstrainedError(
                 f"all {len(points)} points of {name} are one and the same, {points[0]}: a {model} takes "
                 "points that span the image"
@@ -52,7 +52,8 @@ def paired_points(a: Array, b: Array, columns: int, fewest: int, model: str) -> 
 
 def spread(points: Array) -> float:
     """Root mean square distance of points from their mean."""
-    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
+    off = (points - points.sum(axis=0) / len(points)).ravel()
+    return float(np.sqrt(off @ off / len(points)))
 
 
 def similarity_about(points: Array, scale: float) -> Array:

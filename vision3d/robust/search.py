@@ -24,7 +24,10 @@ REASONS = {1: "confidence reached", 2: "budget spent", 3: "all agree"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """What a search ends with: the model (p,), squared errors, and the weights (N,) of its last fit."""
+    """What a search ends with: the model (p,), squared errors, and the weights (N,) of its last fit.
+
+    The covariance of the model is sigma² · inflation times the inverse information of the weighted rows.
+    """
 
     model: Array
     errors2: Array
@@ -34,6 +37,12 @@ class Found:
     iterations: int
     stopped: str
     backend: str = "own"
+    inflation: float = 1.0
+
+    def variance(self, sigma: Array | float | None, scale: float = 1.0) -> float:
+        """What to multiply the inverse information by; sigma, where it is known, is in units of 1 / scale."""
+        known = self.sigma2 if sigma is None else (float(np.median(sigma)) / scale) ** 2
+        return self.inflation * known
 
 
 def fit(
@@ -117,7 +126,6 @@ def search(
     rng: np.random.Generator | None = None,
 ) -> Found:
     """Look for the model that most rows agree with, by the project's own loop."""
-    from vision3d.kernels.robust_local import polish
     from vision3d.kernels.robust_loop import NONE_FOUND, robust_loop
 
     rows = checked_rows(model, data)
@@ -142,28 +150,29 @@ def search(
                 f"none of {int(told[0])} samples of {model.sample_size} rows determines a {model.name}: "
                 "they are degenerate (all equal, or on one line); give rows that differ"
             )
-        if settings.method == "lmeds":
-            threshold2 = median_threshold2(model, errors)
-        blend = settings.refine == "mixture"
-        sigma2 = polish(addresses, rows, weights, threshold2, model.error_dof, blend, best, errors, share)
-    sigma2 *= _spare(model, errors, threshold2)
-    return Found(best, errors, share, sigma2, threshold2, int(told[0]), REASONS[code])
+    found = Found(best, errors, share, np.nan, threshold2, int(told[0]), REASONS[code])
+    if settings.method == "lmeds":
+        wide = replace(found, threshold2=median_threshold2(model, errors))
+        found = refined(model, rows, settings, weights, wide)
+        if found.sigma2 > 0.0:  # the median is over outliers too: those that agree know better
+            found = replace(found, threshold2=WITHIN[model.error_dof] * found.sigma2)
+    return refined(model, rows, settings, weights, found)
 
 
 def refined(model: RobustModel, data: Array, settings: RansacSettings, weights: Array, found: Found) -> Found:
     """The last fit again, from the model that `found` now holds; the rest of what it tells stays."""
-    from vision3d.kernels.robust_local import polish
+    from vision3d.kernels.robust_polish import polish
 
     rows, best = checked_rows(model, data), found.model.copy()
-    errors, share = np.empty(len(rows)), np.empty(len(rows))
-    blend = settings.refine == "mixture"
+    n, dof, blend = len(rows), model.error_dof, settings.refine == "mixture"
+    errors, share, mixture = np.empty(n), np.empty(n), np.empty(5)
     with model.functions() as f:
         addresses = np.array([f.solve, f.residuals, f.fit], np.int64)
-        sigma2 = polish(
-            addresses, rows, weights, found.threshold2, model.error_dof, blend, best, errors, share
-        )
-    sigma2 *= _spare(model, errors, found.threshold2)
-    return replace(found, model=best, errors2=errors, weights=share, sigma2=sigma2)
+        polish(addresses, rows, weights, found.threshold2, dof, blend, best, errors, share, mixture)
+    narrow2, noise2, inflation = mixture[2:]
+    sigma2 = noise2 * _spare(model, errors, found.threshold2)
+    inflation *= narrow2 / noise2 if noise2 > 0.0 else 1.0
+    return replace(found, model=best, errors2=errors, weights=share, sigma2=sigma2, inflation=inflation)
 
 
 def assess(

@@ -93,7 +93,7 @@ def fit_similarity(
     rows = np.column_stack([(a - middle_a) / size_a, (b - middle_b) / size_b])
     inside = replace(settings, threshold=settings.threshold / size_b)
     found = search(model, rows, inside, relative_weights(sigma, len(a)), rng)
-    sigma2 = size_b**2 * found.sigma2 if sigma is None else float(np.median(sigma)) ** 2
+    sigma2 = size_b**2 * found.variance(sigma, size_b)
     turned, scale, shift = _parts(found.model)
     scale *= size_b / size_a
     t = middle_b + size_b * shift - scale * turned @ middle_a

@@ -3,17 +3,12 @@
 import cv2
 import numpy as np
 import pytest
-from robust_worlds import fundamental_matches, nees
+from robust_worlds import fundamental_matches, nees, off_lines_px
 
 from sequential.errors import DataError, UnderConstrainedError
-from vision3d.robust import RansacSettings, eight_point, epipolar_distances, fit_fundamental
+from vision3d.robust import RansacSettings, eight_point, fit_fundamental
 
 SETTINGS = RansacSettings(threshold=2.0, inner_samples=5)
-
-
-def off(F, world):
-    """Root mean square distance in px of the exact matches from their epipolar lines."""
-    return float(np.sqrt(np.mean(np.square(epipolar_distances(F, world.exact_a, world.exact_b)))))
 
 
 def aligned(F, truth):
@@ -72,9 +67,9 @@ def test_better_than_opencv_s_ransac(share, rng):
     ours, theirs = [], []
     for _ in range(8):
         world = fundamental_matches(rng, share)
-        ours.append(off(fit_fundamental(world.a, world.b, SETTINGS, rng=rng).model, world))
+        ours.append(off_lines_px(fit_fundamental(world.a, world.b, SETTINGS, rng=rng).model, world))
         outside = RansacSettings(threshold=2.0, backend="opencv", max_iterations=2000)
-        theirs.append(off(fit_fundamental(world.a, world.b, outside, rng=rng).model, world))
+        theirs.append(off_lines_px(fit_fundamental(world.a, world.b, outside, rng=rng).model, world))
     assert np.median(ours) < 0.5
     assert np.median(ours) < 0.7 * np.median(theirs)
 
@@ -97,7 +92,7 @@ def test_a_dominant_plane_is_met_and_told(rng):
         world = fundamental_matches(rng, 0.8, plane=0.85)
         found = fit_fundamental(world.a, world.b, SETTINGS, rng=rng)
         assert "lie on one plane" in found.note
-        ours.append(off(found.model, world))
+        ours.append(off_lines_px(found.model, world))
     assert np.median(ours) < 0.4
 
 

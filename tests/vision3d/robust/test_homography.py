@@ -136,3 +136,17 @@ def test_what_determines_no_homography_is_refused(a, b, error, said):
 def test_settings_that_cannot_be_meant_are_refused(wrong):
     with pytest.raises(Exception, match=next(iter(wrong))):
         RansacSettings(**wrong)
+
+
+@pytest.mark.slow
+def test_heavy_tails_do_not_spoil_the_fit_nor_its_covariance(rng, seeds):
+    ours, plain, told = [], [], []
+    for _ in range(5 * len(seeds)):
+        a = rng.uniform(0.0, 640.0, (200, 2))
+        b = carried(HOMOGRAPHY, a) + 0.4 * rng.standard_t(3, (200, 2))
+        found = fit_homography(a, b, rng=rng)
+        ours.append(corner_error_px(found.model))
+        plain.append(corner_error_px(fit_homography(a, b, RansacSettings(refine="msac"), rng=rng).model))
+        told.append(nees(found.model.ravel() - UNIT.ravel(), found.cov)[0])
+    assert np.mean(ours) < 0.95 * np.mean(plain)
+    assert 0.8 < np.mean(told) < 1.3
