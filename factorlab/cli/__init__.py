@@ -22,6 +22,7 @@ from factorlab.cli.objects import objects
 from factorlab.cli.record import record
 from factorlab.cli.sfm import sfm
 from factorlab.cli.sheet import sheet
+from factorlab.cli.stereo import stereo
 from factorlab.cli.tune import tune
 from factorlab.cli.undistort import undistort
 
@@ -66,6 +67,7 @@ for command in (
     live,
     camera,
     undistort,
+    stereo,
     markers,
     objects,
     sfm,

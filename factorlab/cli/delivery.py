@@ -14,7 +14,7 @@ from factorlab.cli.settings import print_json
 if TYPE_CHECKING:
     from factorlab.report.document import Document
 
-__all__ = ["deliver", "header_option", "require_output"]
+__all__ = ["deliver", "header_option", "require_output", "show"]
 
 COLOURS = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
 HEADER = "calibration.h"
@@ -61,10 +61,7 @@ def deliver(
 
     `c_header` is where calibration.h of `files` goes besides.
     """
-    if as_json:
-        print_json(document.to_json())
-    else:
-        _show(document)
+    show(document, as_json=as_json)
     if out is not None:
         from factorlab.report.document import write_document
 
@@ -77,6 +74,14 @@ def deliver(
             file.write((files or {})[HEADER])
         click.echo(f"header: {c_header}", err=as_json)
     return CHECK_FAILED if check and document.failed else 0
+
+
+def show(document: Document, *, as_json: bool) -> None:
+    """Print lines or JSON."""
+    if as_json:
+        print_json(document.to_json())
+    else:
+        _show(document)
 
 
 def _show(document: Document) -> None:

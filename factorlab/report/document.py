@@ -29,7 +29,7 @@ from factorlab.report.words import WORDS, Language, interval, number
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Cell", "Document", "Section", "Status", "Table", "Verdict", "write_document"]
+__all__ = ["Cell", "Document", "Section", "Status", "Table", "Verdict", "fill_folder", "write_document"]
 
 Status = Literal["PASS", "WARN", "FAIL", "INFO"]
 Cell = str | float | None
@@ -151,15 +151,20 @@ def write_document(
         where `out` holds files and `force` is False.
     """
     with whole_folder(out, force=force) as folder:
-        (folder / "report.html").write_text(render_document(document), encoding="utf-8")
-        for name, content in (files or {}).items():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
-        there = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-        whole = document.to_json() | {"files": [*there, MANIFEST]}
-        text = json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False)
-        (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+        fill_folder(document, folder, files)
     return out / "report.html"
+
+
+def fill_folder(document: Document, folder: Path, files: Mapping[str, str | bytes] | None = None) -> None:
+    """Write page and JSON into a folder that may hold files already; the JSON names all of them."""
+    (folder / "report.html").write_text(render_document(document), encoding="utf-8")
+    for name, content in (files or {}).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    there = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+    whole = document.to_json() | {"files": [*there, MANIFEST]}
+    text = json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False)
+    (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
 
 
 def render_document(document: Document) -> str:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from factorlab.report.camera_figures import frame_axes, height_of
+from factorlab.report.stereo_pictures import rectified_pairs
 from factorlab.report.style import blank, legend_below, log_axis
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["depth_spread", "pair_poses", "rectified_pair", "residual_fields", "row_differences"]
 
 FITTED, LEFT_OUT, SOFT, GREEN = "#0072B2", "#D55E00", "#9a9a9a", "#009E73"
-LINES = 12  # drawn over a rectified pair
 AXES = (("x", "#D55E00"), ("y", "#009E73"), ("z", "#0072B2"))
 
 
@@ -35,21 +35,8 @@ def rectified_pair(done: CalibratedStereo) -> Figure | None:
     assert left is not None  # noqa: S101 - chosen so
     assert right is not None  # noqa: S101 - chosen so
     pair = done.rectification
-    vertical = pair.axis == 1
-    figure, axes = blank(height_of(pair.size), 1, 2) if not vertical else blank(9.0, 2, 1)
-    x0, y0, x1, y1 = pair.valid
-    at = np.linspace(0, pair.size[1 - pair.axis] - 1, LINES + 2)[1:-1]
-    for ax, image, title in zip(
-        axes.ravel(), pair.images(left[1], right[1]), (left[0], right[0]), strict=True
-    ):
-        ax.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="bilinear")
-        for k, where in enumerate(at):
-            line = ax.axvline if vertical else ax.axhline
-            line(where, color=("#56d364", "#f2cc60")[k % 2], linewidth=0.8)
-        ax.plot([x0, x1, x1, x0, x0], [y0, y0, y1, y1, y0], color="#ff6b4a", linewidth=1.0, linestyle="--")
-        frame_axes(ax, pair.size)
-        ax.set_title(title)
-    return figure
+    images_rectified = pair.images(left[1], right[1])
+    return rectified_pairs([(left[0].rsplit(".", 1)[0], *images_rectified)], pair.axis, pair.valid)
 
 
 def row_differences(done: CalibratedStereo) -> Figure | None:
