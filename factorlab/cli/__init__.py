@@ -18,6 +18,7 @@ from factorlab.cli.info import info
 from factorlab.cli.line import line
 from factorlab.cli.live import live
 from factorlab.cli.markers import markers
+from factorlab.cli.match import match
 from factorlab.cli.objects import objects
 from factorlab.cli.record import record
 from factorlab.cli.sfm import sfm
@@ -69,6 +70,7 @@ for command in (
     undistort,
     stereo,
     markers,
+    match,
     objects,
     sfm,
     cloud,

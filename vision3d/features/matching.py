@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from sequential.errors import DataError, ModelError
 from vision3d.features.features import Array, Features, Matches
 
-__all__ = ["APART_PX", "match_features", "match_table"]
+__all__ = ["APART_PX", "descriptor_table", "match_features", "match_table"]
 
 AT_ONCE = 4_000_000  # distances held in memory
 APART_PX = 10.0
@@ -102,6 +103,13 @@ def _nearest(
         nearest = np.where(best >= 0, own, nearest)
         second = np.maximum(second, nearest)
     return best, nearest, second, best_of_b
+
+
+def descriptor_table(a: NDArray[Any], b: NDArray[Any]) -> Array:
+    """Distances (N, M) between all rows of descriptors: bits, or Euclidean."""
+    if a.dtype == np.uint8:
+        return _bits_apart(a, b).astype(np.float64)
+    return np.asarray(np.sqrt(_squares_apart(a, b)), dtype=np.float64)
 
 
 def _bits_apart(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float32]:
