@@ -24,7 +24,7 @@ __all__ = ["AGREED", "BUDGET", "CONFIDENT", "NONE_FOUND", "robust_loop"]
 
 NONE_FOUND, CONFIDENT, BUDGET, AGREED = 0, 1, 2, 3
 THRESHOLD2, CONFIDENCE, TRIALS, KIND, GROWING, LOCAL, PROSAC_TRIALS = range(7)  # of options
-SAMPLE, MODELS, BLOCK, INNER, TIMES, SOLVE_COST = range(6)  # of sizes
+SAMPLE, MODELS, BLOCK, INNER, TIMES, SOLVE_COST, REDRAWS = range(7)  # of sizes
 MSAC, COUNT, MEDIAN = range(3)  # KIND
 ENOUGH = 250  # agreeing rows that a local optimisation looks at
 BAD_ROWS = 200.0  # how many rows the first guess of that share is worth
@@ -128,17 +128,19 @@ def robust_loop(data, weights, functions, sizes, options, seed, model, errors, t
     found, candidate, share = np.empty((sizes[MODELS], p)), np.empty(p), np.empty(n)
     room, looked, test = np.empty(min(n, sizes[BLOCK])), np.zeros(2), np.empty(3)
     test[0], test[1], test[2] = 0.0, 0.0, math.inf  # nothing is given up before there is something
-    best, best_sample, most, lost, trial = math.inf, math.inf, 0, 0.0, 0
+    best, best_sample, most, lost, trial, tried = math.inf, math.inf, 0, 0.0, 0, 0
     bad_rows, bad_agree = BAD_ROWS, BAD_ROWS * AT_FIRST
     needed = trials_needed(n // 2, n, m, confidence, 0.0) if median else math.inf
     told[3] = 0.0
-    while trial < options[TRIALS] and trial < needed:
+    draws = options[TRIALS] * sizes[REDRAWS]
+    while tried < options[TRIALS] and trial < needed and trial < draws:
         trial += 1
         if growing:
             draw_growing(random, trial, n, growth, sample)
         else:
             draw(random, n, 0, m, sample)
         models = call(functions[0], pointer(data, 0), n, data.shape[1], pointer(sample, 0), pointer(found, 0))
+        tried += 1 if models > 0 else 0
         for s in range(models):
             if median:
                 cost = median_cost(functions[1], rows, heavy, found[s], errors)

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError, UnderConstrainedError
+from vision3d.robust.found import relative_weights, result_of
 from vision3d.robust.model import Addresses, CompiledModel
 from vision3d.robust.result import RobustFit
 from vision3d.robust.scaling import checked_points, spread
-from vision3d.robust.search import relative_weights, result_of, search
+from vision3d.robust.search import search
 from vision3d.robust.settings import RansacSettings
 
 __all__ = ["LINE", "PLANE", "fit_line", "fit_plane"]

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from sequential.errors import UnderConstrainedError
 from vision3d.robust.backends import search_outside
 from vision3d.robust.covariance import pseudo_inverse, unit_norm
+from vision3d.robust.found import Found, relative_weights, result_of
 from vision3d.robust.homography import HOMOGRAPHY
 from vision3d.robust.model import Addresses, CompiledModel
 from vision3d.robust.result import RobustFit
 from vision3d.robust.scaling import paired_points, similarity_about, spread
-from vision3d.robust.search import Found, assess, refined, relative_weights, result_of, search
+from vision3d.robust.search import assess, refined, search
 from vision3d.robust.settings import RansacSettings
 
 __all__ = ["FUNDAMENTAL", "eight_point", "epipolar_distances", "fit_fundamental"]

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from vision3d.robust.backends import search_outside
 from vision3d.robust.covariance import pseudo_inverse, unit_norm
+from vision3d.robust.found import Found, relative_weights, result_of
 from vision3d.robust.model import Addresses, CompiledModel
 from vision3d.robust.result import RobustFit
 from vision3d.robust.scaling import paired_points, similarity_about, spread
-from vision3d.robust.search import Found, assess, relative_weights, result_of, search
+from vision3d.robust.search import assess, search
 from vision3d.robust.settings import DEFAULT, RansacSettings
 
 __all__ = ["HOMOGRAPHY", "fit_homography", "transfer", "transfer_cov"]
@@ -29,7 +30,7 @@ def _load() -> Addresses:
 
 
 HOMOGRAPHY = CompiledModel(
-    "homography", 4, 4, 9, error_dof=2, freedom=8, inner_size=16, solve_cost=60, load=_load
+    "homography", 4, 4, 9, error_dof=2, freedom=8, inner_size=16, solve_cost=60, redraws=20, load=_load
 )
 
 

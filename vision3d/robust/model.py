@@ -42,6 +42,7 @@ class RobustModel:
     freedom : degrees of freedom of the model
     inner_size : rows of a subset that local optimisation fits
     solve_cost : a sample's solution, in rows whose error takes as long
+    redraws : samples drawn at most for each one that counts, where degenerate ones cost next to nothing
     """
 
     name: str
@@ -53,6 +54,7 @@ class RobustModel:
     freedom: int = 1
     inner_size: int = 12
     solve_cost: int = 100
+    redraws: int = 1
 
     @property
     def block(self) -> int:

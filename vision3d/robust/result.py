@@ -23,7 +23,7 @@ class RobustFit:
     inliers : (N,) whether each row's error is below the threshold
     errors : (N,) each row's error, in the unit of the threshold
     sigma : standard deviation of one component of an inlier's error, estimated
-    iterations : samples drawn; -1 where a backend does not say
+    iterations : samples drawn, degenerate ones too; -1 where a backend does not say
     stopped : "confidence reached", "budget spent", "all agree", or "not said" by a backend
     score : mean of the truncated squared errors over threshold²: 0 is perfect, 1 says that nothing agrees
     threshold : that was applied

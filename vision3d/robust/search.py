@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError, NotFiniteError, ShapeError, UnderConstrainedError
 from vision3d.robust.backends import Outside
+from vision3d.robust.found import Found, relative_weights, result_of
 from vision3d.robust.model import RobustModel
 from vision3d.robust.result import RobustFit
 from vision3d.robust.settings import DEFAULT, RansacSettings
@@ -19,30 +20,9 @@ Array = NDArray[np.float64]
 MEDIAN = {1: 0.4549364, 2: 1.3862944, 3: 2.3659739}  # of chi squared, by degrees of freedom
 WITHIN = {1: 6.25, 2: 9.0, 3: 11.0}  # of chi squared: some 99 %
 PROSAC_TRIALS = 200_000.0
+NO_HALF = 0.1  # of the data's standard deviation: errors that are no noise
+SCATTERED = "no half of the rows agrees with one model, which LMedS needs; take method='ransac'"
 REASONS = {1: "confidence reached", 2: "budget spent", 3: "all agree"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """What a search ends with: the model (p,), squared errors, and the weights (N,) of its last fit.
-
-    The covariance of the model is sigma² · inflation times the inverse information of the weighted rows.
-    """
-
-    model: Array
-    errors2: Array
-    weights: Array
-    sigma2: float
-    threshold2: float
-    iterations: int
-    stopped: str
-    backend: str = "own"
-    inflation: float = 1.0
-
-    def variance(self, sigma: Array | float | None, scale: float = 1.0) -> float:
-        """What to multiply the inverse information by; sigma, where it is known, is in units of 1 / scale."""
-        known = self.sigma2 if sigma is None else (float(np.median(sigma)) / scale) ** 2
-        return self.inflation * known
 
 
 def fit(
@@ -79,43 +59,6 @@ def fit(
     found = search(model, data, settings, relative_weights(sigma, len(data)), rng)
     unknown = np.full((model.parameters, model.parameters), np.nan)
     return result_of(found, found.model, unknown)
-
-
-def result_of(found: Found, model: Array, cov: Array, *, scale: float = 1.0, note: str = "") -> RobustFit:
-    """The result, with errors multiplied by scale: the unit of the data over that of the search."""
-    inliers = found.errors2 < found.threshold2
-    cost = np.where(inliers, found.errors2 / found.threshold2, 1.0)
-    return RobustFit(
-        model=model,
-        cov=cov,
-        inliers=inliers,
-        errors=scale * np.sqrt(found.errors2),
-        sigma=scale * float(np.sqrt(found.sigma2)),
-        iterations=found.iterations,
-        stopped=found.stopped,
-        score=float(cost.mean()),
-        threshold=scale * float(np.sqrt(found.threshold2)),
-        backend=found.backend,
-        note=note,
-    )
-
-
-def relative_weights(sigma: Array | float | None, count: int) -> Array:
-    """(median sigma / sigma)² of each row; 1 without sigmas.
-
-    Raises
-    ------
-    DataError
-        for sigmas that are not one positive number a row.
-    """
-    if sigma is None or np.ndim(sigma) == 0:
-        return np.ones(count)
-    given = np.ascontiguousarray(sigma, dtype=np.float64)
-    if given.shape != (count,) or not (given > 0.0).all() or not np.isfinite(given).all():
-        raise DataError(
-            f"sigma is one positive standard deviation for each of {count} rows; got {given.shape}"
-        )
-    return np.asarray((np.median(given) / given) ** 2)
 
 
 def search(
@@ -156,6 +99,8 @@ def search(
         found = refined(model, rows, settings, weights, wide)
         if found.sigma2 > 0.0:  # the median is over outliers too: those that agree know better
             found = replace(found, threshold2=WITHIN[model.error_dof] * found.sigma2)
+        if found.threshold2 > (NO_HALF * rows.std(axis=0).max()) ** 2:
+            found = replace(found, note=SCATTERED)
     return refined(model, rows, settings, weights, found)
 
 
@@ -218,6 +163,7 @@ def _sizes(model: RobustModel, settings: RansacSettings) -> NDArray[np.int64]:
             model.inner_size,
             settings.inner_samples,
             model.solve_cost,
+            model.redraws,
         ]
     )
 

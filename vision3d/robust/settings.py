@@ -33,7 +33,8 @@ class RansacSettings:
         homography).  Some three to four standard deviations of the noise; larger does little harm with
         `refine="mixture"`
     confidence : probability that at least one sample was free of outliers when the search stops early
-    max_iterations : samples at most
+    max_iterations : samples at most that give a model to try; a homography's degenerate ones are drawn again,
+        up to twenty times as many
     score : "msac" adds up truncated squares, "count" counts outliers
     method : "ransac", or "lmeds" which needs no threshold but more inliers than outliers
     order : "prosac" where rows come best first: the best are tried first

@@ -159,6 +159,13 @@ def test_lmeds_needs_no_threshold_while_half_the_rows_are_right(rng):
     assert 1.7 < found.threshold < 2.5
 
 
+def test_lmeds_says_so_where_no_half_agrees(rng):
+    a, b, _ = matches(rng, 0.3)
+    assert "take method='ransac'" in fit_homography(a, b, RansacSettings(method="lmeds"), rng=rng).note
+    a, b, _ = matches(rng, 0.7)
+    assert not fit_homography(a, b, RansacSettings(method="lmeds"), rng=rng).note
+
+
 def test_no_structure_is_not_mistaken_for_some(rng):
     a, b = rng.uniform(0.0, 640.0, (2, 300, 2))
     found = fit_homography(a, b, RansacSettings(max_iterations=20_000))
@@ -185,3 +192,11 @@ def test_compiled_functions_are_where_they_say(model):
         done = form(f.residuals)(rows.ctypes.data, 3, model.columns, given.ctypes.data, errors.ctypes.data)
     assert done == 1
     assert np.isfinite(errors).all()
+
+
+def test_degenerate_samples_of_a_homography_do_not_use_up_the_budget(rng):
+    a, b, _ = matches(rng, 0.15)
+    found = fit_homography(a, b, RansacSettings(max_iterations=10_000), rng=rng)
+    assert found.iterations > 10_000
+    assert found.stopped == "confidence reached"
+    assert corner_error_px(found.model) < 1.5
