@@ -14,6 +14,11 @@ COMMANDS = {
         "rectify",
         "Pairs of pictures as parallel cameras would have taken them.",
     ),
+    "depth": (
+        "factorlab.cli.stereo_depth",
+        "depth",
+        "Disparity, depth and a cloud of points from two pictures.",
+    ),
 }
 
 
