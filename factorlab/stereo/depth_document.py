@@ -26,7 +26,7 @@ DISPARITY_READ = (
 )
 MASK_READ = (
     "Green: matched, and confirmed from the right picture. Blue: seen by the left camera only. Orange: "
-    "matched, but not confirmed. Right: how much cheaper the best match is than the next one."
+    "matched, but not confirmed. Right: how much cheaper the best match is than the next."
 )
 CLOUD_READ = "Matched points in the colours of their pixels, from beside the camera and from above."
 GROUND_READ = (
@@ -35,8 +35,8 @@ GROUND_READ = (
 )
 DEPTH_READ = "Left: depth. Right: its standard deviation over depth; one dot is one matched pixel."
 TRUTH_READ = (
-    "Left: error of disparity, clipped at ±3 px; grey where the truth is not known. Right: error over standard "
-    "deviation of matched pixels, beside the normal density."
+    "Left: error of disparity, clipped at ±3 px; grey where the truth is not known. Right: error over "
+    "standard deviation of matched pixels, beside the normal density."
 )
 
 

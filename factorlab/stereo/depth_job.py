@@ -104,7 +104,9 @@ def measure_depth(
     clock.done("matching")
     depth = None if geometry is None else _depth(disparity, geometry)
     clock.done("depth")
-    cloud, planes, ground = None, (), None
+    cloud: DepthCloud | None = None
+    planes: tuple[DepthPlane, ...] = ()
+    ground: DepthPlane | None = None
     if depth is not None and geometry is not None:
         cloud, planes, ground = _solids(depth, geometry, left, settings)
     clock.done("planes")

@@ -65,11 +65,11 @@ def pair_from_files(
     from vision3d.images import read_image
     from vision3d.stereo.rig_files import read_rig
 
-    pictures = [read_image(one, colour=True) for one in (left, right)]
+    a, b = (read_image(one, colour=True) for one in (left, right))
     return StereoPair(
-        Path(left).name, Path(right).name, *pictures,
-        None if rig is None else read_rig(rig),
-        None if truth is None else read_truth(truth, pictures[0].shape[:2], truth_scale),
+        Path(left).name, Path(right).name, a, b,
+        None if rig is None else read_rig(rig, size=(a.shape[1], a.shape[0])),
+        None if truth is None else read_truth(truth, a.shape[:2], truth_scale),
         f"{Path(left).name} and {Path(right).name}",
     )  # fmt: skip
 
@@ -122,11 +122,12 @@ def demo_pair(seed: int = 0) -> StereoPair:
         from skimage.data import stereo_motorcycle
     except ImportError:
         return rendered_pair(np.random.default_rng(seed))
-    left, right, truth = stereo_motorcycle()
+    loaded: Any = stereo_motorcycle
+    left, right, truth = loaded()
     told = np.where(np.isfinite(truth) & (truth > 0.0), truth, np.nan).astype(np.float32)
-    pictures = [np.ascontiguousarray(one[..., ::-1], dtype=np.uint8) for one in (left, right)]
+    a, b = (np.ascontiguousarray(one[..., ::-1], dtype=np.uint8) for one in (left, right))
     return StereoPair(
-        "motorcycle_left", "motorcycle_right", *pictures, motorcycle_rig(pictures[0].shape[1::-1]), told,
+        "motorcycle_left", "motorcycle_right", a, b, motorcycle_rig((a.shape[1], a.shape[0])), told,
         "scikit-image's copy of the motorcycle (Middlebury 2014, a quarter of its size)",
     )  # fmt: skip
 
@@ -148,11 +149,11 @@ def rendered_pair(rng: np.random.Generator, size: tuple[int, int] = (640, 480)) 
     )  # fmt: skip
 
 
-def motorcycle_rig(size: tuple[int, ...]) -> StereoRig:
+def motorcycle_rig(size: tuple[int, int]) -> StereoRig:
     """The rig of the motorcycle at a quarter of its size."""
     from vision3d.camera import Camera
     from vision3d.stereo.rig import StereoRig
 
     focal, cx, cy, cx_right, baseline = MOTORCYCLE
-    cameras = [Camera("pinhole", (focal, focal, x, cy), (), size) for x in (cx, cx_right)]
-    return StereoRig(*cameras, np.array([1.0, 0.0, 0.0, 0.0, -baseline, 0.0, 0.0]))
+    left, right = (Camera("pinhole", (focal, focal, x, cy), (), size) for x in (cx, cx_right))
+    return StereoRig(left, right, np.array([1.0, 0.0, 0.0, 0.0, -baseline, 0.0, 0.0]))

@@ -140,9 +140,10 @@ def _depth(run: DepthRun) -> list[Verdict]:
         ]  # fmt: skip
     z, std = (values[depth.measured] for values in (depth.z_m, depth.std_m))
     middle, spread = float(np.median(z)), float(np.median(std))
+    near, far = (float(v) for v in np.percentile(z, [5, 95]))
     found = [
         Verdict(
-            "depth", middle, tuple(float(v) for v in np.percentile(z, [5, 95])), "INFO",
+            "depth", middle, (near, far), "INFO",
             f"median; 5 to 95 % of the pixels in brackets; σ of a match {1e3 * spread:.0f} mm",
             unit="m",
         )

@@ -86,7 +86,7 @@ def _moved(rig: StereoRig, k: int, step: float) -> StereoRig:
     parameters = cameras[side].parameters.copy()
     parameters[k] += step
     cameras[side] = cameras[side].with_parameters(parameters)
-    return StereoRig(*cameras, rig.right_T_left)
+    return StereoRig(cameras[0], cameras[1], rig.right_T_left)
 
 
 def _triangulated(rig: StereoRig, left: Any, right: Any) -> Array:
@@ -98,4 +98,5 @@ def _triangulated(rig: StereoRig, left: Any, right: Any) -> Array:
     pa, pb = a @ base, b @ base
     bottom = np.maximum(1.0 - ab**2, 1e-15)
     s, t = (pa - ab * pb) / bottom, (ab * pa - pb) / bottom
-    return 0.5 * (s[:, None] * a + base + t[:, None] * b)
+    middle: Array = 0.5 * (s[:, None] * a + base + t[:, None] * b)
+    return middle

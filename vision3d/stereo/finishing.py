@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["finished"]
 
+LEAST_CONFIDENCE = 0.005  # below it every disparity costs the same
+FLAT_HALF, FLAT_LEVELS = 7, 0.5  # a window whose levels vary by less has nothing to match
 HALF_MEDIAN, MEDIAN_LEVELS = 5, 10.0  # of the weighted median, px, and grey levels a channel
 
 
@@ -25,7 +27,7 @@ def finished(a: Any, b: Any, raw: RawDisparity, range_px: tuple[int, int], how: 
     from vision3d.stereo.left_right import agree, hidden, without_speckles
     from vision3d.stereo.precision import settled
 
-    valid = np.isfinite(raw.left)
+    valid = np.isfinite(raw.left) & ~(raw.confidence < LEAST_CONFIDENCE) & ~_flat(a)
     occluded = np.zeros_like(valid)
     if raw.right is not None:
         valid &= agree(raw.left, raw.right, how.left_right_px)
@@ -42,6 +44,15 @@ def finished(a: Any, b: Any, raw: RawDisparity, range_px: tuple[int, int], how: 
         full = np.where(valid, full, np.float32(np.nan))
         std = np.where(valid, std, np.float32(np.nan))
     return Disparity(full, std, valid, occluded, raw.confidence, range_px, how.matcher)
+
+
+def _flat(a: Any) -> Any:
+    """Where a window has no texture at all, not even noise: black, saturated or painted."""
+    import cv2
+
+    grey, size = a.mean(axis=2, dtype=np.float64), (2 * FLAT_HALF + 1, 2 * FLAT_HALF + 1)
+    mean = cv2.blur(grey, size)
+    return cv2.blur(grey**2, size) - mean**2 < FLAT_LEVELS**2
 
 
 def _nothing(raw: RawDisparity, range_px: tuple[int, int], how: StereoSettings) -> Disparity:

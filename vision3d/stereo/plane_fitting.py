@@ -21,7 +21,7 @@ SEEDS, ROUNDS = 120, 8
 GATE = 3.0  # standard deviations
 LOOSE = 2.0  # what a surface may be uneven by, in medians of the pixels' standard deviation
 TUKEY = 4.685
-NEIGHBOURS = 49.0  # pixels that share a window of the match, and so an error
+NEIGHBOURS = 289.0  # pixels (17 by 17) over which errors of matches go together
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +42,7 @@ class InverseDepth:
         z = points[..., 2]
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse, rays = 1.0 / z, points / z[..., None]
-            known = np.isfinite(points).all(axis=-1)
+            known = np.asarray(np.isfinite(points).all(axis=-1))
             spread = relative_std * z
             if isinstance(depth, Depth):
                 known &= depth.measured & np.isfinite(depth.std_m)
@@ -87,7 +87,7 @@ def best_plane(data: InverseDepth, free: Mask) -> FittedPlane | None:
             best, most = members, support
     if best is None:
         return None
-    m = np.linalg.solve(*_normal(tiles, best))
+    m: Array = np.linalg.solve(*_normal(tiles, best))
     return _polished(data, free, m)
 
 
@@ -169,4 +169,5 @@ def _polished(data: InverseDepth, free: Mask, m: Array) -> FittedPlane | None:
     close = np.abs(inverse - rays @ m) < GATE * loose
     inliers = np.zeros_like(free)
     inliers[free] = close
-    return FittedPlane(m, NEIGHBOURS * np.linalg.inv(information), inliers)
+    cov: Array = NEIGHBOURS * np.linalg.inv(information)
+    return FittedPlane(m, cov, inliers)

@@ -105,7 +105,7 @@ def _fitted(a: Array, b: Array, width: int, height: int) -> RowCheck:
     half = len(ranked) // 2
     k = int(np.argmin(ranked[half:] - ranked[: len(ranked) - half]))
     keep = np.abs(offset - np.median(ranked[k : k + half + 1])) < max(3.0, REACH * height)
-    solution = np.zeros(3)
+    solution: Array = np.zeros(3)
     for _ in range(8):
         if keep.sum() < LEAST:
             return _unknown(len(a))
