@@ -87,7 +87,7 @@ def best_plane(data: InverseDepth, free: Mask) -> FittedPlane | None:
             best, most = members, support
     if best is None:
         return None
-    m: Array = np.linalg.solve(*_normal(tiles, best))
+    m = np.asarray(np.linalg.solve(*_normal(tiles, best)), dtype=np.float64)
     return _polished(data, free, m)
 
 
@@ -169,5 +169,5 @@ def _polished(data: InverseDepth, free: Mask, m: Array) -> FittedPlane | None:
     close = np.abs(inverse - rays @ m) < GATE * loose
     inliers = np.zeros_like(free)
     inliers[free] = close
-    cov: Array = NEIGHBOURS * np.linalg.inv(information)
+    cov = np.asarray(NEIGHBOURS * np.linalg.inv(information), dtype=np.float64)
     return FittedPlane(m, cov, inliers)

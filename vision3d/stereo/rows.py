@@ -105,11 +105,11 @@ def _fitted(a: Array, b: Array, width: int, height: int) -> RowCheck:
     half = len(ranked) // 2
     k = int(np.argmin(ranked[half:] - ranked[: len(ranked) - half]))
     keep = np.abs(offset - np.median(ranked[k : k + half + 1])) < max(3.0, REACH * height)
-    solution: Array = np.zeros(3)
+    solution = np.zeros(3)
     for _ in range(8):
         if keep.sum() < LEAST:
             return _unknown(len(a))
-        solution = np.linalg.lstsq(design[keep], offset[keep], rcond=None)[0]
+        solution = np.asarray(np.linalg.lstsq(design[keep], offset[keep], rcond=None)[0], dtype=np.float64)
         residual = np.abs(offset - design @ solution)
         keep = residual < max(0.5, 3.0 * 1.4826 * float(np.median(residual[keep])))
     if keep.sum() < LEAST:
