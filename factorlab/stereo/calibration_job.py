@@ -17,6 +17,7 @@ from vision3d.stereo.view_pairs import ViewPair
 if TYPE_CHECKING:
     from vision3d.camera import Camera
     from vision3d.stereo.calibration import StereoCalibration
+    from vision3d.stereo.held_out import HeldOut
     from vision3d.views import Detections, View
 
 __all__ = ["calibrate_held_pairs", "calibrate_stereo_pictures"]
@@ -59,7 +60,6 @@ def calibrate_held_pairs(
 ) -> CalibratedStereo:
     """Calibrate from pairs in memory.  Raises as `calibrate_stereo_pictures`."""
     from vision3d.stereo.deviations import deviations
-    from vision3d.stereo.held_out import leave_pairs_out
 
     seconds: dict[str, float] = {}
     cameras = tuple(
@@ -75,11 +75,10 @@ def calibrate_held_pairs(
         alone = tuple(_alone(pairs, side, settings, cameras[side], say) for side in (0, 1))
     progress("the rig", total, total)
     with timed(seconds, "rig"):
-        fit = _together(pairs, settings, (alone[0], alone[1]), (cameras[0], cameras[1]))
+        fit, held = _together(pairs, settings, (alone[0], alone[1]), (cameras[0], cameras[1]))
     for one in fit.disagreeing:
         say(str(one))
     with timed(seconds, "checks"):
-        held = leave_pairs_out(fit)
         apart = deviations(fit)
     return CalibratedStereo(
         settings, pictures, (detections[0], detections[1]), (alone[0], alone[1]), fit, held, apart, seconds
@@ -161,19 +160,21 @@ def _together(
     settings: StereoSettings,
     alone: tuple[Fitted | None, Fitted | None],
     known: tuple[Camera | None, Camera | None],
-) -> StereoCalibration:
-    from vision3d.stereo.fit import calibrate_stereo
+) -> tuple[StereoCalibration, HeldOut | None]:
+    from vision3d.stereo.lens_pair import calibrate_with_best_lenses
 
     fits = tuple(None if one is None else one.calibration for one in alone)
-    lenses = tuple("brown5" if fit is None else fit.camera.lens for fit in fits)
+    # a lens that was asked for is that of both, one that is held no choice of the other
+    asked = [fit.camera.lens for fit in fits if fit is not None] or ["brown5"]
+    lenses = asked[0], asked[-1]
     held = tuple(
         fit.camera if camera is None and fit is not None and settings.intrinsics == "alone" else camera
         for fit, camera in zip(fits, known, strict=True)
     )
     bent = any(fit is not None and bool(fit.warp_std.any()) for fit in fits)
-    return calibrate_stereo(
+    return calibrate_with_best_lenses(
         pairs,
-        (lenses[0], lenses[1]),
+        lenses,
         cameras=(held[0], held[1]),
         start=(fits[0], fits[1]),
         robust=settings.robust,

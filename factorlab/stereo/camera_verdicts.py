@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from factorlab.camera.fitting import Fitted
 from factorlab.camera.verdicts import judged
 from factorlab.report.document import Status, Verdict
 from factorlab.stereo.calibrated import CalibratedStereo
@@ -39,13 +40,24 @@ def _cameras(done: CalibratedStereo) -> list[Verdict]:
             continue
         relative = float(max(std[0] / fx, std[1] / fy))
         fold = camera.check_monotonic()
-        why = f"; {alone.choice.why}" if alone is not None and alone.choice is not None else ""
+        why = _why(camera.lens, alone)
         status = "FAIL" if fold.inside else judged(relative, GOOD_FOCAL, FAIR_FOCAL)
         meaning = f"{values}; lens {camera.lens}{why}" + (f"; {fold}" if fold.inside else "")
         action = "" if status == "PASS" else "tilt the board by 30 to 45° to every side, and come near"
         metric = f"{side} camera, σ of the focal length"
         found.append(Verdict(metric, 100 * relative, None, status, meaning, action, "%"))
     return found
+
+
+def _why(lens: str, alone: Fitted | None) -> str:
+    """Why this lens."""
+    if alone is None or alone.choice is None:
+        return ""
+    if alone.choice.chosen == lens:
+        return f"; {alone.choice.why}"
+    return (
+        f", as the other camera: rows of left-out pairs lie nearer together than with {alone.choice.chosen}"
+    )
 
 
 def _depth(done: CalibratedStereo) -> Verdict:

@@ -65,10 +65,16 @@ def alone(
                 )
             poses[v] = posed(known, view)
         return Alone(known, poses, None)
-    if start is None or [view.name for view in start.views] != [view.name for view in own]:
+    if start is None or not _is_of(start, own, lens):
         start = calibrate(own, lens, robust=robust, board_warp=board_warp, start=start)
     poses[seen] = start.poses
     return Alone(start.camera, poses, start)
+
+
+def _is_of(start: Calibration, views: Sequence[View], lens: str) -> bool:
+    """Whether a calibration is of these views with this lens."""
+    names = [view.name for view in views]
+    return start.camera.lens == lens and [view.name for view in start.views] == names
 
 
 def posed(camera: Camera, view: View) -> Array:

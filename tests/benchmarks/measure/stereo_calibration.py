@@ -24,7 +24,7 @@ from vision3d.images import ImageSet, read_images
 from vision3d.render.rig_set import render_board_pairs
 from vision3d.stereo import StereoRig, rectify
 from vision3d.stereo.fit import calibrate_stereo
-from vision3d.stereo.held_out import leave_pairs_out
+from vision3d.stereo.lens_pair import calibrate_with_best_lenses
 from vision3d.stereo.row_errors import Measured, measured
 from vision3d.stereo.view_pairs import ViewPair, pairs_of_views
 from vision3d.views import View
@@ -56,12 +56,11 @@ def real_pairs(folder: Path) -> dict[str, Figure]:
     images = [read_images(str(folder / f"{side}??.jpg")) for side in ("left", "right")]
     ours = pairs_of_views(*(detect_views(one, BOARD).views for one in images))
     theirs = pairs_of_views(*(opencv_views(one) for one in images))
-    lenses = lenses_of(ours)
-    found = calibrate_stereo(ours, lenses)
-    sizes, held = rows_of(found.rig, ours), leave_pairs_out(found)
+    found, held = calibrate_with_best_lenses(ours, lenses_of(ours))
+    sizes, lenses = rows_of(found.rig, ours), (found.rig.left.lens, found.rig.right.lens)
     equal = tuple(of_one_sigma(pair) for pair in theirs)
-    same_lenses = lenses_of(equal)
-    same = calibrate_stereo(equal, same_lenses)
+    same, _ = calibrate_with_best_lenses(equal, lenses_of(equal))
+    same_lenses = same.rig.left.lens, same.rig.right.lens
     same_rows = rows_of(same.rig, theirs)
     peer_rms, peer = opencv_rig(theirs)
     peer_rows = rows_of(peer, theirs)

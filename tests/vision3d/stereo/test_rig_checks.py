@@ -15,6 +15,7 @@ from vision3d.stereo import StereoRig, rectify
 from vision3d.stereo.deviations import deviations
 from vision3d.stereo.fit import calibrate_stereo
 from vision3d.stereo.held_out import leave_pairs_out
+from vision3d.stereo.lens_pair import calibrate_with_best_lenses
 from vision3d.stereo.rig_uncertainty import rig_jacobian, rig_uncertainty
 from vision3d.stereo.row_errors import measured
 from vision3d.stereo.view_pairs import pairs_of_views
@@ -155,3 +156,14 @@ def test_other_sizes_of_the_two_cameras(rng):
     assert found.rig.right.size == (320, 240)
     assert leave_pairs_out(found).row_px < 0.5
     assert len(pairs_of_views([None], [None])) == 0
+
+
+def test_lenses_are_chosen_by_the_rows_of_left_out_pairs(rng):
+    """A lens without the tangential terms that the right camera has is given up for that of the left one."""
+    right = Camera("brown4", (536.0, 535.0, 327.0, 250.0), (-0.29, 0.06, 0.004, -0.003), (640, 480))
+    pairs = stereo_world(StereoRig(WORLD.rig.left, right, WORLD.rig.right_T_left), n=10).pairs(rng)
+    found, held = calibrate_with_best_lenses(pairs, ("brown5", "brown2"))
+    assert (found.rig.left.lens, found.rig.right.lens) == ("brown5", "brown5")
+    assert held.row_px < leave_pairs_out(calibrate_stereo(pairs, ("brown5", "brown2"))).row_px
+    same, _ = calibrate_with_best_lenses(pairs[:3], ("brown2", "brown2"))
+    assert same.rig.right.lens == "brown2"
