@@ -7,7 +7,7 @@ the fit leaves.  The first point stays; the second moves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,8 @@ __all__ = ["refine_matches"]
 BLUR_PX = 0.7  # interpolation is exact only for what is smooth
 ITERATIONS = 30
 LEFT_OUT = 1.15  # times the variance, on light that is known: interpolation, and steps that are not linear
-FLOOR_PX = 0.015  # what photographs leave that were sampled twice
+FLOOR_PX = 0.01  # what photographs leave that were sampled twice
+DISAGREE = 16.0  # of chi squared with two degrees of freedom: one in three thousand
 WORST_PX = 0.3  # beyond, the fit is no longer linear, and its covariance means nothing
 Image = NDArray[np.float32]
 ENOUGH, SAMPLE = 30, 300  # patches that tell the correlation of the residuals
@@ -40,6 +41,7 @@ def refine_matches(
     levels: int = 2,
     reach_px: float = 3.0,
     min_correlation: float = 0.8,
+    confirm: bool = True,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Move the second point of every match to where the patch about the first lies.
 
@@ -54,6 +56,8 @@ def refine_matches(
     levels : of the pyramid, coarsest first; what fails on one is tried on the next
     reach_px : farthest that a point may move on the coarsest level, px of it
     min_correlation : of both patches after the fit, 0 to 1
+    confirm : fit windows of about half the size as well, and refuse where they disagree: on the edge of
+        something near, one window has two motions in it
 
     Returns
     -------
@@ -85,11 +89,13 @@ def refine_matches(
     if given.shape != (len(a), 2, 2):
         raise ShapeError(f"warps of {len(a)} matches are ({len(a)}, 2, 2), got {given.shape}")
     given = given.copy()
-    found = _Found(a, b.copy(), given, np.full((len(a), 2, 2), np.nan), np.zeros(len(a), np.bool_))
+    found = _Found(a, b.copy(), given, np.full((len(a), 2, 2), np.nan), np.zeros(len(a), np.bool_), b)
     window = _Window(radius_px, affine, reach_px, min_correlation)
     first, second = _Pyramid(grey_bytes(image_a)), _Pyramid(grey_bytes(image_b))
     for level in range(levels - 1, -1, -1):
         _level(first, second, level, found, window)
+    if confirm:
+        _confirm(first, second, found, window)
     return found.b, found.cov, found.ok
 
 
@@ -102,6 +108,7 @@ class _Found:
     warp: Array
     cov: Array
     ok: NDArray[np.bool_]
+    given: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +119,7 @@ class _Window:
     affine: bool
     reach: float
     least: float
+    worst: float = WORST_PX
 
 
 def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window: _Window) -> None:
@@ -131,7 +139,7 @@ def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window:
             found.warp[rows] * (own_a / own_b), window,
         )  # fmt: skip
         with np.errstate(invalid="ignore"):
-            sure = (covs[:, [0, 2]] >= 0.0).all(axis=1) & (covs[:, 0] + covs[:, 2] < 2.0 * WORST_PX**2)
+            sure = (covs[:, [0, 2]] >= 0.0).all(axis=1) & (covs[:, 0] + covs[:, 2] < 2.0 * window.worst**2)
         good = (facts[:, 0] >= window.least) & sure
         done = rows[good]
         found.b[done], found.warp[done] = place[good] * own_b, turned[good] * (own_b / own_a)
@@ -139,6 +147,23 @@ def _level(first: _Pyramid, second: _Pyramid, level: int, found: _Found, window:
             LEFT_OUT * covs[good][:, [0, 1, 1, 2]].reshape(-1, 2, 2) + FLOOR_PX**2 * np.eye(2)
         )
         found.ok[done] = True
+
+
+def _confirm(first: _Pyramid, second: _Pyramid, found: _Found, window: _Window) -> None:
+    """Refuse matches whose smaller windows lie elsewhere, by more than both covariances together allow."""
+    rows = np.flatnonzero(found.ok)
+    again = _Found(
+        found.a[rows], found.b[rows].copy(), found.warp[rows].copy(), found.cov[rows].copy(),
+        np.zeros(len(rows), np.bool_), found.b[rows],
+    )  # fmt: skip
+    # a small window may know little; what it knows counts
+    smaller = replace(window, radius=max(3, (window.radius + 1) // 2), least=0.5, worst=1.0)
+    _level(first, second, 0, again, smaller)
+    apart = again.b - found.b[rows]
+    squares = np.einsum("ni,nij,nj->n", apart, np.linalg.inv(again.cov + found.cov[rows]), apart)
+    wrong = rows[~again.ok | (squares > DISAGREE)]
+    found.ok[wrong] = False
+    found.b[wrong], found.cov[wrong] = found.given[wrong], np.nan
 
 
 def _aligned(

@@ -91,6 +91,6 @@ def test_covariance_is_honest(amplitude, noise, rng):
     )
     error = (found - truth)[ok]
     nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(cov[ok]), error) / 2
-    assert ok.mean() > 0.6
+    assert ok.mean() > 0.4
     # the floor, which photographs need, is all that strong texture has left
     assert (0.7 if amplitude < 20 else 0.4) < nees.mean() < 1.35
