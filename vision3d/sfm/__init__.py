@@ -3,7 +3,7 @@
 from vision3d.sfm.colmap import from_pycolmap, to_pycolmap
 from vision3d.sfm.explaining import NoModelError
 from vision3d.sfm.patience import Stopped
-from vision3d.sfm.reconstruct import reconstruct
+from vision3d.sfm.pipeline import reconstruct
 from vision3d.sfm.reconstruction import Reconstruction
 from vision3d.sfm.settings import SfmSettings
 from vision3d.sfm.view_graph import ViewGraph

@@ -6,11 +6,11 @@ from typing import Any
 
 __all__ = ["colmap"]
 
-ERRORS_ONLY = 2
+FATAL_ONLY = 3
 
 
 def colmap() -> Any:
-    """The module `pycolmap`, which says nothing below an error on the screen.
+    """The module `pycolmap`, which says nothing on the screen short of its end.
 
     Its wheel brings a zlib of its own whose functions others would bind to: Python's is loaded first, or
     the first compression after this import would end the process.
@@ -19,6 +19,6 @@ def colmap() -> Any:
 
     import pycolmap
 
-    pycolmap.logging.minloglevel = ERRORS_ONLY
+    pycolmap.logging.minloglevel = FATAL_ONLY
     pycolmap.logging.alsologtostderr = False
     return pycolmap

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["map_pictures"]
 
 SMALLEST_MODEL = 2
+FEWEST_POINTS = 20
+SMALL_ANGLE_DEG = 2.0  # between the rays of the first pair, where none has COLMAP's 16
 
 
 def map_pictures(
@@ -38,6 +40,8 @@ def map_pictures(
 
             def solve(_: Any) -> Any:
                 theirs.set_random_seed(settings.seed)  # of this thread
+                if settings.camera is None:
+                    theirs.calibrate_view_graph(database)
                 return theirs.global_mapping(database, folder, folder, options)
 
             models = patience.run(solve)
@@ -56,7 +60,18 @@ def map_pictures(
                 )
 
             models = patience.run(grow)
-    return sorted(models.values(), key=lambda one: (-one.num_reg_images(), -one.num_points3D()))
+            if not _useful(models) and not patience.over:
+                # a drive straight ahead, or a short step: less is asked of the pair to start from
+                incremental.mapper.init_max_forward_motion = 1.0
+                incremental.mapper.init_min_tri_angle = SMALL_ANGLE_DEG
+                placed[0] = 2
+                models = patience.run(grow)
+    return sorted(_useful(models), key=lambda one: (-one.num_reg_images(), -one.num_points3D()))
+
+
+def _useful(models: dict[int, pycolmap.Reconstruction]) -> list[pycolmap.Reconstruction]:
+    """Those with points: pictures taken on the spot come back with poses and without."""
+    return [one for one in models.values() if one.num_points3D() >= FEWEST_POINTS]
 
 
 def _incremental_options(theirs: Any, settings: SfmSettings) -> Any:
