@@ -1,5 +1,7 @@
 """Reconstructions whose truth is known: cameras about a cloud of points, and what they see of it."""
 
+from functools import cache
+
 import numpy as np
 
 from sequential.manifold import SE3
@@ -9,6 +11,7 @@ from vision3d.rigid import inverse, transform
 from vision3d.sfm import Reconstruction
 
 CAMERA = Camera("brown1", (520.0, 520.0, 319.5, 239.5), (-0.08,), (640, 480))
+SMALL = Camera("brown1", (330.0, 330.0, 199.5, 149.5), (-0.08,), (400, 300))
 SE = SE3()
 
 
@@ -56,3 +59,43 @@ def seen_cloud(rng, views=6, count=120, sigma_px=0.0, camera=CAMERA, poses=None)
         pixels=pixels,
         sigma_px=max(sigma_px, 1e-3),
     )
+
+
+@cache
+def rendered(name):
+    """Pictures by name and their true poses: "desk", "turned", "bricks", "wall" or "elsewhere"."""
+    from vision3d.render import desk, render_scene, repeated_wall, wall
+
+    rng = np.random.default_rng(11)
+    if name == "bricks":
+        scene, poses = repeated_wall(rng), _arc_about(4, (0.0, 0.0, 2.0), 1.8, 0.5)
+    elif name == "turned":
+        scene, poses = desk(rng), np.array([_turn(a) for a in np.linspace(-0.3, 0.3, 4)])
+    elif name == "wall":
+        scene, poses = wall(rng), _arc_about(4, (0.0, 0.0, 2.0), 1.8, 0.7)
+    else:
+        scene = desk(np.random.default_rng(99 if name == "elsewhere" else 5))
+        count = 2 if name == "elsewhere" else 5
+        poses = _arc_about(count, (0.0, 0.1, 1.5), 1.6, 0.7)
+    names = [f"{name}{k}.png" for k in range(len(poses))]
+    images = {
+        one: render_scene(SMALL, pose, scene, rng=rng).image for one, pose in zip(names, poses, strict=True)
+    }
+    return images, dict(zip(names, poses, strict=True))
+
+
+def _arc_about(count, target, distance, spread_rad):
+    target = np.asarray(target)
+    angles = np.linspace(-0.5 * spread_rad, 0.5 * spread_rad, count)
+    return np.array(
+        [
+            looking_at(
+                target + distance * np.array([np.sin(a), 0.06 * np.cos(4 * a) - 0.1, -np.cos(a)]), target
+            )
+            for a in angles
+        ]
+    )
+
+
+def _turn(angle_rad):
+    return np.array([np.cos(0.5 * angle_rad), 0.0, np.sin(0.5 * angle_rad), 0.0, 0.0, 0.0, 0.0])

@@ -34,6 +34,8 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
                  help="Features are sought in pictures reduced to this longer side."),
     click.option("--max-features", type=click.IntRange(100), default=8192, show_default=True, metavar="N",
                  help="Features kept of each picture."),
+    click.option("--refine/--no-refine", default=True, show_default=True,
+                 help="Adjust once more with our own bundle adjustment, which gives standard deviations."),
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of random draws."),
     click.option("--threads", type=click.IntRange(0), default=0, metavar="N",
                  help="For features and matches.  [default: one a processor]"),
@@ -105,4 +107,4 @@ def _job(options: dict[str, Any]) -> SfmJob:
         max_size=options["max_size"], max_features=options["max_features"], seed=options["seed"],
         threads=options["threads"],
     )  # fmt: skip
-    return SfmJob(settings, options["camera"], options["which"])
+    return SfmJob(settings, options["camera"], options["which"], refine=options["refine"])

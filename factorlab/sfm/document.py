@@ -9,6 +9,7 @@ import numpy as np
 from factorlab.report.document import Document, Section, Table
 from factorlab.sfm.exports import mean_of
 from factorlab.sfm.job import SfmDone
+from factorlab.sfm.places import place_sigmas
 from factorlab.sfm.verdicts import verdicts_of
 from vision3d.sfm import Reconstruction
 
@@ -105,12 +106,14 @@ def picture_rows(found: Reconstruction) -> list[dict[str, Any]]:
 
 def _picture_table(done: SfmDone, found: Reconstruction) -> Section:
     features = {} if done.graph is None else dict(zip(done.graph.names, done.graph.features, strict=True))
+    sigmas = place_sigmas(done)
     rows = tuple(
         (str(k + 1), row["name"], str(row["camera"]), int(features.get(row["name"], 0)) or None,
-         row["points"], row["mean_error_px"], *row["centre"])
+         row["points"], row["mean_error_px"], *row["centre"],
+         None if sigmas is None else float(sigmas[k]))
         for k, row in enumerate(picture_rows(found))
     )  # fmt: skip
-    headings = ("", "picture", "camera", "features", "points", ("error", "px"), "x", "y", "z")
+    headings = ("", "picture", "camera", "features", "points", ("error", "px"), "x", "y", "z", "σ of place")
     text = "Places are in the world of the model, whose unit is free."
     return Section("Pictures", text, Table(headings, rows), page_only=len(found) > 40)
 
@@ -157,6 +160,20 @@ def _numbers(done: SfmDone) -> dict[str, Any]:
                 for camera in found.cameras
             ],
             "pictures": picture_rows(found),
+        }
+    if (result := done.adjusted) is not None:
+        sigmas = place_sigmas(done)
+        numbers["adjustment"] = {
+            "cost_colmap_px2": result.initial_cost,
+            "cost_px2": result.cost,
+            "route": result.route,
+            "iterations": result.iterations,
+            "loss": result.loss,
+            "gauge": result.gauge,
+            "sigma_px": result.sigma_px,
+            "sigma_place": None if sigmas is None else sigmas.tolist(),
+            "free": [list(names) for names in result.free],
+            "intrinsics_covs": [cov.tolist() for cov in result.intrinsics_covs or ()],
         }
     if graph is not None:
         numbers["pairs"] = [

@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 from vision3d.sfm import NoModelError, Reconstruction, SfmSettings, ViewGraph, reconstruct
 
 if TYPE_CHECKING:
+    from factorlab.graph.bundle import BundleResult
     from vision3d.sfm.view_graph import Loops
 
 __all__ = ["SfmDone", "SfmJob", "run_sfm"]
+
+MOST_OBSERVATIONS = 200_000  # that our own adjustment takes on unasked
 
 
 @dataclass(frozen=True)
@@ -30,11 +33,13 @@ class SfmJob:
     settings : of the reconstruction; a camera from a file is put in when it is read
     camera : its file; None: the pictures calibrate it
     which : camera in that file, where there are several
+    refine : adjust once more with our own bundle adjustment, which says how sure everything is
     """
 
     settings: SfmSettings = field(default_factory=SfmSettings)
     camera: Path | None = None
     which: str | None = None
+    refine: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +56,8 @@ class SfmDone:
     graph : which pictures were matched with which
     seconds : the whole took
     stopped : it was ended early
+    adjusted : our bundle adjustment of COLMAP's model, with covariances; its model is `found`
+    unadjusted : why there is none
     """
 
     sources: tuple[str, ...]
@@ -61,6 +68,8 @@ class SfmDone:
     graph: ViewGraph | None
     seconds: float
     stopped: bool = False
+    adjusted: BundleResult | None = None
+    unadjusted: str = ""
 
     @property
     def given(self) -> int:
@@ -111,4 +120,29 @@ def run_sfm(
     except NoModelError as error:
         fault, graph, missing = str(error), error.graph, error.missing
     stopped = stop is not None and stop.is_set()
-    return SfmDone(tuple(sources), job, found, fault, missing, graph, time.perf_counter() - began, stopped)
+    result, why = None, ""
+    if found is not None and job.refine and not stopped:
+        progress("adjusting", 0, 1)
+        found, result, why = _adjusted(found, job)
+    seconds = time.perf_counter() - began
+    return SfmDone(tuple(sources), job, found, fault, missing, graph, seconds, stopped, result, why)
+
+
+def _adjusted(found: Reconstruction, job: SfmJob) -> tuple[Reconstruction, BundleResult | None, str]:
+    """The model after our own adjustment with the loss that COLMAP ended with; or why it is COLMAP's."""
+    from factorlab.graph.bundle import bundle_adjust
+    from sequential.errors import FactorlabError
+    from vision3d.sfm.settling import soft_scale
+
+    if len(found.pixels) > MOST_OBSERVATIONS:
+        return found, None, f"{len(found.pixels)} observations are more than {MOST_OBSERVATIONS}"
+    try:
+        result = bundle_adjust(
+            found, refine_intrinsics=job.settings.camera is None, loss="soft_l1",
+            loss_px=soft_scale(found), gauge="centres",
+        )  # fmt: skip
+    except FactorlabError as error:
+        return found, None, str(error)
+    if not result.converged:
+        return found, None, result.message
+    return result.reconstruction, result, ""

@@ -6,6 +6,7 @@ import numpy as np
 
 from factorlab.report.document import Status, Verdict
 from factorlab.sfm.job import SfmDone
+from factorlab.sfm.places import place_sigmas, typical_distance
 from vision3d.sfm import Reconstruction
 
 __all__ = ["verdicts_of"]
@@ -16,7 +17,9 @@ GOOD_ANGLE, FAIR_ANGLE = np.radians(4.0), np.radians(1.5)
 GOOD_TRACK, GOOD_SEEN = 2.5, 50
 FLAT = 0.02  # thickness over width of a cloud that is a plane
 LOOP_RAD, LOOPS_WRONG = np.radians(10.0), 0.1
-EXIF_OFF = 0.1  # relative difference to the focal length of EXIF that is worth a word
+GOOD_FOCAL, FAIR_FOCAL = 0.01, 0.05  # standard deviation of a focal length, relative
+GOOD_PLACE, FAIR_PLACE = 0.005, 0.03  # standard deviation of a place over its distance to the points
+GOOD_AGREEMENT = 0.005  # of two adjustments' costs
 MOST_NAMED = 6
 
 
@@ -27,7 +30,8 @@ def verdicts_of(done: SfmDone) -> tuple[Verdict, ...]:
     if found is None:
         return (*verdicts, *_turned_or_flat(done))
     verdicts += [_error(found), _tracks(found), _angles(done), *_flat(done), *_weakest(found)]
-    verdicts += [*_loops(done), *_cameras(done)]
+    verdicts += _partners(done)
+    verdicts += [*_loops(done), *_cameras(done), *_places(done), *_adjustment(done)]
     scale = "lengths are in no unit: one known distance, or two known places, would give it"
     return (*verdicts, Verdict("scale", None, None, "INFO", scale))
 
@@ -64,6 +68,17 @@ def _turned_or_flat(done: SfmDone) -> list[Verdict]:
     kinds = {kind: graph.share_of(kind) for kind in ("general", "planar", "pure rotation", "flat or turned")}
     told = ", ".join(f"{100.0 * share:.0f} % {kind}" for kind, share in kinds.items() if share > 0.0)
     return [Verdict("pairs that match", verified, None, "INFO", told, "", f"of {len(graph.pairs)}")]
+
+
+def _partners(done: SfmDone) -> list[Verdict]:
+    """Texture that repeats leaves few matches, and those are not to be trusted."""
+    from vision3d.sfm.explaining import FEW_PARTNERS, partnered
+
+    if done.graph is None or (share := partnered(done.graph)) >= FEW_PARTNERS:
+        return []
+    meaning = "few, in the median picture: what is seen repeats, or pictures overlap little"
+    action = "do not trust the model before a look at it; take in something that is there once"
+    return [Verdict("features with a partner", 100.0 * share, None, "WARN", meaning, action, "%")]
 
 
 def _judged(value: float, good: float, fair: float) -> Status:
@@ -164,5 +179,52 @@ def _cameras(done: SfmDone) -> list[Verdict]:
             continue
         across = 2.0 * np.degrees(np.arctan(0.5 * camera.size[0] / value))
         meaning = f"from the pictures ({camera.lens}); they see {across:.0f}° across"
-        verdicts.append(Verdict(metric, value, None, "INFO", meaning, unit="px"))
+        band: tuple[float, float] | None = None
+        status: Status = "INFO"
+        action = ""
+        if (sigma := _focal_sigma(done, k)) is not None:
+            band = (value - 1.96 * sigma, value + 1.96 * sigma)
+            status = _judged(sigma / value, GOOD_FOCAL, FAIR_FOCAL)
+            action = "" if status == "PASS" else "give --camera, or add pictures from all around"
+        verdicts.append(Verdict(metric, value, band, status, meaning, action, "px"))
     return verdicts if len(verdicts) <= MOST_NAMED else verdicts[:MOST_NAMED]
+
+
+def _focal_sigma(done: SfmDone, camera: int) -> float | None:
+    """Standard deviation of a camera's focal length, px; None where it was not computed."""
+    result = done.adjusted
+    if result is None or result.intrinsics_covs is None:
+        return None
+    names = result.free[camera]
+    rows = [k for k, name in enumerate(names) if name in {"f", "fx"}]
+    return float(np.sqrt(result.intrinsics_covs[camera][rows[0], rows[0]])) if rows else None
+
+
+def _places(done: SfmDone) -> list[Verdict]:
+    """How sure the least sure camera is of its place, against its distance to what it sees."""
+    found, sigmas = done.found, place_sigmas(done)
+    if found is None or sigmas is None:
+        return []
+    share = sigmas / typical_distance(found)
+    worst = int(np.argmax(share))
+    status = _judged(float(share[worst]), GOOD_PLACE, FAIR_PLACE)
+    meaning = f"largest σ, of {found.names[worst]}, over the distance of the points; median {_percent(share)}"
+    action = "" if status == "PASS" else "add pictures between it and its neighbours"
+    return [Verdict("place of a camera", 100.0 * float(share[worst]), None, status, meaning, action, "%")]
+
+
+def _percent(share: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    return f"{100.0 * float(np.median(share)):.2g} %"
+
+
+def _adjustment(done: SfmDone) -> list[Verdict]:
+    """Our own bundle adjustment against COLMAP's, on the same observations and loss."""
+    result = done.adjusted
+    if result is None:
+        why = done.unadjusted
+        return [Verdict("our adjustment", None, None, "WARN", why, "no covariances are given")] if why else []
+    change = result.cost / result.initial_cost - 1.0
+    status: Status = "PASS" if abs(change) <= GOOD_AGREEMENT else "WARN"
+    meaning = f"change of COLMAP's cost by our bundle adjustment, {result.iterations} steps ({result.route})"
+    action = "" if status == "PASS" else "the two disagree about the minimum; see the residuals"
+    return [Verdict("our adjustment", 100.0 * change, None, status, meaning, action, "%")]

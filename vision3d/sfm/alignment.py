@@ -17,6 +17,7 @@ from sequential.manifold.quaternion import (
     quaternion_inverse,
     quaternion_multiply,
     rotate,
+    rotation_matrix,
 )
 from vision3d.rigid import inverse
 from vision3d.sfm.reconstruction import Reconstruction
@@ -26,6 +27,7 @@ __all__ = ["Alignment", "align", "transformed"]
 
 Array = NDArray[np.float64]
 FEWEST = 3
+OWN_DIRECTIONS = 0.1  # weight of the directions of the cameras beside their places
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,7 @@ def align(found: Reconstruction, truth_T_world: dict[str, Array]) -> Alignment:
         raise DataError(f"a similarity needs {FEWEST} pictures that the truth knows, got {len(views)}")
     truth = np.array([truth_T_world[found.names[k]] for k in views])
     theirs, ours = inverse(truth), inverse(found.cameras_T_world[views])
-    scale, rotation, translation = _umeyama(ours[:, 4:], theirs[:, 4:])
+    scale, rotation, translation = _umeyama(ours, theirs)
     moved = scale * rotate(rotation, ours[:, 4:]) + translation
     turned = quaternion_multiply(np.broadcast_to(rotation, (len(views), 4)), ours[:, :4])
     between = quaternion_multiply(quaternion_inverse(theirs[:, :4]), turned)
@@ -92,14 +94,19 @@ def transformed(found: Reconstruction, alignment: Alignment) -> Reconstruction:
 
 
 def _umeyama(source: Array, target: Array) -> tuple[float, Array, Array]:
-    """Scale, quaternion and translation that take source (N, 3) nearest to target (N, 3)."""
-    middle_s, middle_t = source.mean(axis=0), target.mean(axis=0)
-    apart_s, apart_t = source - middle_s, target - middle_t
-    spread = float((apart_s**2).sum())
-    if spread <= 0.0:
+    """Scale, quaternion and translation that take the places of poses (N, 7) nearest to each other.
+
+    Cameras along a line leave the turn about it open; a small share of their own directions decides it.
+    """
+    middle_s, middle_t = source[:, 4:].mean(axis=0), target[:, 4:].mean(axis=0)
+    apart_s, apart_t = source[:, 4:] - middle_s, target[:, 4:] - middle_t
+    spread_s, spread_t = float((apart_s**2).sum()), float((apart_t**2).sum())
+    if spread_s <= 0.0 or spread_t <= 0.0:
         raise DataError("all cameras of the model are in one place, which leaves scale and direction open")
-    u, values, vt = np.linalg.svd(apart_t.T @ apart_s)
-    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    turn = (u * sign) @ vt
-    scale = float((values * sign).sum() / spread)
+    turns_s, turns_t = rotation_matrix(source[:, :4]), rotation_matrix(target[:, :4])
+    places = apart_t.T @ apart_s / np.sqrt(spread_s * spread_t)
+    directions = np.einsum("nij,nkj->ik", turns_t, turns_s) / len(source)
+    u, _, vt = np.linalg.svd(places + OWN_DIRECTIONS * directions)
+    turn = (u * np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])) @ vt
+    scale = float((apart_t * (apart_s @ turn.T)).sum() / spread_s)
     return scale, quaternion_from_matrix(turn), middle_t - scale * turn @ middle_s

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["from_pycolmap", "pixels_from_colmap", "pixels_to_colmap", "to_pycolmap"]
 
 Array = NDArray[np.float64]
+ONE_FOCAL = {"pinhole": "SIMPLE_PINHOLE", "brown1": "SIMPLE_RADIAL", "brown2": "RADIAL"}
 
 
 def pixels_to_colmap(pixels: Array) -> Array:
@@ -121,6 +122,11 @@ def pose_to_pycolmap(pose: Array) -> pycolmap.Rigid3d:
     return rigid
 
 
+def _one_focal(camera: Camera) -> str | None:
+    """The model that keeps fx and fy one number where they are; None where they are two."""
+    return ONE_FOCAL.get(camera.lens) if camera.intrinsics[0] == camera.intrinsics[1] else None
+
+
 def to_pycolmap(found: Reconstruction) -> pycolmap.Reconstruction:
     """The same in COLMAP's objects: cameras, pictures and points are numbered from 1 in their order.
 
@@ -131,7 +137,7 @@ def to_pycolmap(found: Reconstruction) -> pycolmap.Reconstruction:
     """
     theirs = colmap()
     made: pycolmap.Reconstruction = theirs.Reconstruction()
-    models: Sequence[str | None] = found.models or [None] * len(found.cameras)
+    models: Sequence[str | None] = found.models or [_one_focal(camera) for camera in found.cameras]
     for k, (camera, model) in enumerate(zip(found.cameras, models, strict=True)):
         made.add_camera_with_trivial_rig(camera_to_pycolmap(camera, k + 1, model))
     place = np.zeros(len(found.pixels), dtype=np.int64)  # of every observation among those of its picture

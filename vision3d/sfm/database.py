@@ -16,7 +16,7 @@ from vision3d.sfm.settings import LENS_MODELS, SfmSettings
 if TYPE_CHECKING:
     import pycolmap
 
-__all__ = ["camera_for", "fill_database"]
+__all__ = ["camera_for", "fill_database", "name_in_database"]
 
 USUAL_FOCAL = 1.2  # of the longer side, px: 45° across, for pictures that do not say
 PLAUSIBLE_FOCAL = (0.35, 4.0)  # of the longer side: 110° to 14° across
@@ -38,6 +38,11 @@ def camera_for(camera: Camera, size: tuple[int, int]) -> Camera:
         told, given = ("x".join(map(str, one)) for one in (camera.size, size))
         raise DataError(f"is {given} px, and the camera that was given has images of {told}")
     return camera.resized(size)
+
+
+def name_in_database(picture: int) -> str:
+    """What COLMAP calls a picture: a number, since its lists part names at spaces."""
+    return f"{picture:06d}"
 
 
 def fill_database(path: Path, pictures: Sequence[PictureFeatures], settings: SfmSettings) -> None:
@@ -81,7 +86,7 @@ def _camera(picture: PictureFeatures, number: int, settings: SfmSettings) -> pyc
 
 def _write_picture(database: pycolmap.Database, picture: PictureFeatures, number: int, camera: int) -> None:
     theirs = colmap()
-    image = theirs.Image(name=picture.name, camera_id=camera, image_id=number)
+    image = theirs.Image(name=name_in_database(number - 1), camera_id=camera, image_id=number)
     database.write_image(image, use_image_id=True)
     frame = theirs.Frame(frame_id=number, rig_id=camera)
     frame.add_data_id(image.data_id)

@@ -9,11 +9,12 @@ import numpy as np
 from sequential.errors import DataError
 from vision3d.sfm.view_graph import ViewGraph
 
-__all__ = ["NoModelError", "why_missing", "why_no_model"]
+__all__ = ["NoModelError", "partnered", "why_missing", "why_no_model"]
 
 FEW_FEATURES = 50
 ENOUGH = 30  # points of the model that a picture has to see to get its place
 MOSTLY = 0.7
+FEW_PARTNERS = 0.08
 
 
 class NoModelError(DataError):
@@ -66,6 +67,14 @@ def why_missing(graph: ViewGraph, picture: int, placed: Collection[int], others:
     return f"matches {name} in {count} points, too few of which have a place in space ({ENOUGH} are needed)"
 
 
+def partnered(graph: ViewGraph) -> float:
+    """Share of a picture's features that the best other picture shares with it, in the median picture."""
+    best = np.zeros(len(graph.names))
+    for (a, b), count in zip(graph.pairs, graph.inliers, strict=True):
+        best[a], best[b] = max(best[a], count), max(best[b], count)
+    return float(np.median(best / np.maximum(graph.features, 1))) if len(best) else 0.0
+
+
 def why_no_model(graph: ViewGraph) -> str:
     """One sentence about pictures that gave no model at all."""
     verified = graph.inliers > 0
@@ -94,6 +103,12 @@ def why_no_model(graph: ViewGraph) -> str:
             "something that is not flat, or give --camera"
         )
     best = int(graph.inliers.max())
+    share = partnered(graph)
+    if share < FEW_PARTNERS:
+        return (
+            f"only {100.0 * share:.0f} % of the features find a partner in another picture: what is seen "
+            "repeats (bricks, windows, leaves), or pictures overlap too little; take in what is there once"
+        )
     return (
         f"no pair is good enough to start from: the best has {best} verified matches; take pictures that "
         "overlap more, seen from places a step apart"

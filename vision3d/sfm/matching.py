@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import combinations
 from pathlib import Path
 
+from vision3d.sfm.database import name_in_database
 from vision3d.sfm.extraction import PictureFeatures
 from vision3d.sfm.library import colmap
+from vision3d.sfm.pairs import worth_matching
 from vision3d.sfm.patience import Patience
 from vision3d.sfm.settings import SfmSettings
 
@@ -24,12 +25,13 @@ def match_all(
     patience: Patience,
     progress: Callable[[str, int, int], None],
 ) -> None:
-    """Match every picture with every other one."""
+    """Match pictures, all pairs of a small set."""
     theirs = colmap()
     matching, verification = theirs.FeatureMatchingOptions(), theirs.TwoViewGeometryOptions()
     matching.num_threads = settings.threads or -1
     verification.ransac.random_seed = settings.seed
-    listed, pairs = database.with_suffix(".pairs"), list(combinations([one.name for one in pictures], 2))
+    listed = database.with_suffix(".pairs")
+    pairs = [(name_in_database(a), name_in_database(b)) for a, b in worth_matching(pictures)]
     for start in range(0, len(pairs), CHUNK):
         progress("matches", start, len(pairs))
         patience.check()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vision3d.sfm.colmap import pose_from_pycolmap
 from vision3d.sfm.extraction import PictureFeatures
 from vision3d.sfm.library import colmap
+from vision3d.sfm.turning import FARTHEST_FROM_TURNING, distance_from_turning
 from vision3d.sfm.view_graph import ViewGraph
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ KINDS = {
     "WATERMARK": "watermark", "DEGENERATE": "none", "UNDEFINED": "none",
 }  # fmt: skip
 """COLMAP's words for the geometry of two views, in ours."""
-TURNED_RAD = np.radians(0.2)  # triangulation angle of a pair below which it shows no depth
+UNSURE = ("planar", "pure rotation", "flat or turned")  # by one homography
 
 
 def view_graph_of(
@@ -54,16 +55,39 @@ def view_graph_of(
         a, b = sorted(theirs.pair_id_to_image_pair(pair))
         geometry = geometries.get(pair)
         inliers = 0 if geometry is None else len(geometry.inlier_matches)
-        kind, turn = "none", np.full(4, np.nan)
+        kind, turn, flat = "none", np.full(4, np.nan), None
         if geometry is not None and inliers:
             first, second = cameras[of_image[a]], cameras[of_image[b]]
-            kind, turn = _again(geometry, pictures[a - 1], pictures[b - 1], first, second, options)
-        rows.append(((a - 1, b - 1), matches, inliers, kind, turn))
-    columns: list[Any] = [list(column) for column in zip(*rows, strict=True)] if rows else [[]] * 5
+            kind, turn, flat = _again(geometry, pictures[a - 1], pictures[b - 1], first, second, options)
+        rows.append(((a - 1, b - 1), matches, inliers, kind, turn, flat))
+    columns: list[Any] = [list(column) for column in zip(*rows, strict=True)] if rows else [[]] * 6
+    if model is None:
+        columns[3] = _turned_after_all(columns[0], columns[3], columns[5], pictures)
     return ViewGraph(
         tuple(one.name for one in pictures), np.array([len(one) for one in pictures]), columns[0],
         columns[1], columns[2], tuple(columns[3]), np.array(columns[4]),
     )  # fmt: skip
+
+
+def _turned_after_all(
+    pairs: Sequence[tuple[int, int]],
+    kinds: Sequence[str],
+    homographies: Sequence[NDArray[np.float64] | None],
+    pictures: Sequence[PictureFeatures],
+) -> list[str]:
+    """Kinds, in which a focal length that is not known does not make a turn look like a plane."""
+    size = pictures[0].size
+    asked = {
+        k: flat
+        for k, (kind, flat) in enumerate(zip(kinds, homographies, strict=True))
+        if kind in UNSURE and flat is not None and all(pictures[i].size == size for i in pairs[k])
+    }
+    distance, _ = distance_from_turning(list(asked.values()), size)
+    told = list(kinds)
+    if distance < FARTHEST_FROM_TURNING:
+        for k in asked:
+            told[k] = "pure rotation"
+    return told
 
 
 def _again(
@@ -73,8 +97,8 @@ def _again(
     camera_a: pycolmap.Camera,
     camera_b: pycolmap.Camera,
     options: pycolmap.TwoViewGeometryOptions,
-) -> tuple[str, NDArray[np.float64]]:
-    """Kind and rotation of a pair from its inliers and the cameras as they are known now."""
+) -> tuple[str, NDArray[np.float64], NDArray[np.float64] | None]:
+    """Kind, rotation and homography of a pair from its inliers and the cameras as they are known now."""
     theirs = colmap()
     inliers = np.array(geometry.inlier_matches)
     pixels_a = a.keypoints[inliers[:, 0], :2].astype(np.float64)
@@ -87,5 +111,5 @@ def _again(
         kind = KINDS.get(names.get(int(geometry.config), ""), "none")
     pose = told.cam2_from_cam1
     if pose is None or kind == "none":
-        return kind, np.full(4, np.nan)
-    return kind, pose_from_pycolmap(pose)[:4]
+        return kind, np.full(4, np.nan), told.H
+    return kind, pose_from_pycolmap(pose)[:4], told.H

@@ -121,6 +121,7 @@ def _told(
         raise NoModelError(why_no_model(graph), graph, tuple(missing))
     known = {} if settings.camera is None else dict.fromkeys(models[0].cameras, settings.camera.lens)
     found = from_pycolmap(models[0], lenses=known)
+    found = found.replaced(names=tuple(pictures[int(name)].name for name in found.names))
     colors = _colours(found, models[0], pictures)
     return settled(found.replaced(missing=tuple(missing), graph=graph, colors=colors), settings)
 

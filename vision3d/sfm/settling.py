@@ -13,7 +13,7 @@ from vision3d.sfm.library import colmap
 from vision3d.sfm.reconstruction import Reconstruction
 from vision3d.sfm.settings import SfmSettings
 
-__all__ = ["adjusted", "settled"]
+__all__ = ["adjusted", "settled", "soft_scale"]
 
 GROSS = 8.0  # standard deviations
 SOFT = 3.0
@@ -23,14 +23,19 @@ LEAST_PX = 0.05  # noise below which the numbers of images tell nothing
 
 def settled(found: Reconstruction, settings: SfmSettings) -> Reconstruction:
     """The model without gross errors; cameras that were given stay as they are."""
-    sigma_px = max(found.sigma_px, LEAST_PX)
+    soft_px = soft_scale(found)
     for _ in range(ROUNDS):
-        found = adjusted(found, soft_px=SOFT * sigma_px, fixed=settings.camera is not None)
-        kept = found.errors_px() <= GROSS * sigma_px
+        found = adjusted(found, soft_px=soft_px, fixed=settings.camera is not None)
+        kept = found.errors_px() <= GROSS / SOFT * soft_px
         if kept.all():
             return found
         found = found.selected(kept)
-    return adjusted(found, soft_px=SOFT * sigma_px, fixed=settings.camera is not None)
+    return adjusted(found, soft_px=soft_px, fixed=settings.camera is not None)
+
+
+def soft_scale(found: Reconstruction) -> float:
+    """The scale of the soft-L1 loss, px: three standard deviations of a pixel coordinate."""
+    return SOFT * max(found.sigma_px, LEAST_PX)
 
 
 def adjusted(found: Reconstruction, *, soft_px: float = 0.0, fixed: bool = False) -> Reconstruction:
