@@ -11,9 +11,8 @@ be so (`at_infinity`) and still has its direction.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,6 +78,18 @@ class Triangulation:
     def dof(self) -> NDArray[np.int64]:
         """(N,) degrees of freedom of `chi2`."""
         return 2 * self.views - 3
+
+    def scaled(self, factor: float) -> Triangulation:
+        """The same points where the variance of all noise is so many times what was declared.
+
+        See `vision3d.variance_factor`, which tells it from the residuals.
+        """
+        if not 0 < factor < np.inf:
+            raise ModelError(f"a variance is multiplied by a positive number, got {factor}")
+        root = np.sqrt(factor)
+        return replace(
+            self, covs=factor * self.covs, chi2=self.chi2 / factor, inverse_std_m=root * self.inverse_std_m
+        )
 
 
 def triangulate(
@@ -189,9 +200,8 @@ def _with_pose_covs(
             f"pose_covs are ({views}, 6, 6) or ({6 * views}, {6 * views}) for {views} views, got {covs.shape}"
         )
     moved = pose_share(found, lenses, poses, seen, whiten).reshape(len(found.points), 3, -1)
-    values: dict[str, Any] = {name: getattr(found, name) for name in found.__dataclass_fields__}
     total = found.covs + moved @ covs @ moved.transpose(0, 2, 1)
-    return Triangulation(**{**values, "covs": np.where(np.isnan(total), found.covs, total)})
+    return replace(found, covs=np.where(np.isnan(total), found.covs, total))
 
 
 def _result(points: Array, covs: Array, stats: Array, middle: Array, unit: float) -> Triangulation:
@@ -225,8 +235,8 @@ def _result(points: Array, covs: Array, stats: Array, middle: Array, unit: float
 def _checked(
     cameras: Camera | Sequence[Camera], cameras_T_world: ArrayLike, pixels: ArrayLike
 ) -> tuple[Array, Array, list[Camera]]:
-    poses = np.array(cameras_T_world, dtype=np.float64)
-    seen = np.array(pixels, dtype=np.float64)
+    poses = np.array(cameras_T_world, dtype=np.float64, order="C")
+    seen = np.array(pixels, dtype=np.float64, order="C")
     if poses.ndim != 2 or poses.shape[1] != 7 or len(poses) < 2:
         raise ShapeError(f"triangulation takes two poses or more, (V, 7); got shape {poses.shape}")
     if seen.ndim != 3 or seen.shape[::2] != (len(poses), 2):

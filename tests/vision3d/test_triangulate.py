@@ -257,3 +257,15 @@ def test_what_cannot_be_triangulated_is_refused(rng):
     folded = Camera("brown1", (560, 560, 320, 240), (-0.6,), (640, 480))
     with pytest.raises(DataError, match="no ray"):
         triangulate(folded, ORBIT[:2], pixels + 600.0)
+
+
+def test_arrays_may_be_laid_out_in_any_way(rng):
+    pixels = project(PINHOLE, ORBIT, points_seen(rng, 20))
+    covs = np.tile(np.eye(2), (4, 20, 1, 1))
+    plain = triangulate(PINHOLE, ORBIT, pixels, sigma_px=covs)
+    odd = triangulate(
+        PINHOLE, np.asfortranarray(ORBIT), np.asfortranarray(pixels), sigma_px=np.asfortranarray(covs)
+    )
+    np.testing.assert_array_equal(odd.points, plain.points)
+    masked = triangulate(PINHOLE, ORBIT, pixels[:, np.arange(20) > 3], sigma_px=covs[:, np.arange(20) > 3])
+    np.testing.assert_array_equal(masked.points, plain.points[4:])
