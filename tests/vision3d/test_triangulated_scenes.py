@@ -1,4 +1,4 @@
-"""From photographs to points: what features, matching and triangulation say of themselves together is true."""
+"""From photographs to points: what features, matching and triangulation together claim is true."""
 
 import numpy as np
 import pytest
@@ -26,12 +26,8 @@ def test_a_camera_that_only_turns_tells_no_distance(rng):
     first, second = detect_features(a.image, "orb"), detect_features(b.image, "orb")
     matches = match_features(first, second)
     poses = np.array([a.camera_T_world, b.camera_T_world])
-    found = triangulate(
-        CAMERA,
-        poses,
-        np.stack(matches.points(first, second)),
-        sigma_px=np.stack(matches.sigma_px(first, second)),
-    )
+    pixels, sigmas = np.stack(matches.points(first, second)), np.stack(matches.sigma_px(first, second))
+    found = triangulate(CAMERA, poses, pixels, sigma_px=sigmas)
     assert len(matches) > 100
     assert found.at_infinity.all()
     assert not found.ok.any()
