@@ -14,7 +14,7 @@ from vision3d.robust.found import Found, relative_weights, result_of
 from vision3d.robust.homography import HOMOGRAPHY
 from vision3d.robust.model import Addresses, CompiledModel
 from vision3d.robust.result import RobustFit
-from vision3d.robust.scaling import paired_points, similarity_about, spread
+from vision3d.robust.scaling import paired_points, scaled_pairs, similarity_about, spread
 from vision3d.robust.search import assess, refined, search
 from vision3d.robust.settings import RansacSettings
 
@@ -89,9 +89,7 @@ def fit_fundamental(
     dominant plane is met by plane and parallax (Chum, Werner, Matas 2005).
     """
     a, b = paired_points(a, b, 2, 7, "fundamental matrix")
-    scale = float(np.sqrt(spread(a) * spread(b)))
-    to_a, to_b = similarity_about(a, scale), similarity_about(b, scale)
-    rows = np.column_stack([a @ to_a[:2, :2] + to_a[:2, 2], b @ to_b[:2, :2] + to_b[:2, 2]])
+    rows, to_a, to_b, scale = scaled_pairs(a, b)
     weights, inside = relative_weights(sigma, len(a)), replace(settings, threshold=settings.threshold / scale)
     if settings.backend == "own":
         found = search(FUNDAMENTAL, rows, inside, weights, rng)

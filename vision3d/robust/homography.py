@@ -12,7 +12,7 @@ from vision3d.robust.covariance import pseudo_inverse, unit_norm
 from vision3d.robust.found import Found, relative_weights, result_of
 from vision3d.robust.model import Addresses, CompiledModel
 from vision3d.robust.result import RobustFit
-from vision3d.robust.scaling import paired_points, similarity_about, spread
+from vision3d.robust.scaling import paired_points, scaled_pairs
 from vision3d.robust.search import assess, search
 from vision3d.robust.settings import DEFAULT, RansacSettings
 
@@ -71,9 +71,7 @@ def fit_homography(
     dominates, and close to best where both images have the same scale.
     """
     a, b = paired_points(a, b, 2, 4, "homography")
-    scale = float(np.sqrt(spread(a) * spread(b)))
-    to_a, to_b = similarity_about(a, scale), similarity_about(b, scale)
-    rows = np.column_stack([a @ to_a[:2, :2] + to_a[:2, 2], b @ to_b[:2, :2] + to_b[:2, 2]])
+    rows, to_a, to_b, scale = scaled_pairs(a, b)
     weights, inside = relative_weights(sigma, len(a)), replace(settings, threshold=settings.threshold / scale)
     from_b = np.linalg.inv(to_b)
     if settings.backend == "own":

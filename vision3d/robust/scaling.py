@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError, NotFiniteError, ShapeError, UnderConstrainedError
 
-__all__ = ["checked_points", "paired_points", "similarity_about", "spread"]
+__all__ = ["checked_points", "paired_points", "scaled_pairs", "similarity_about", "spread"]
 
 Array = NDArray[np.float64]
 
@@ -60,3 +60,11 @@ def similarity_about(points: Array, scale: float) -> Array:
     """The (3, 3) that takes the mean of plane points to 0 and divides by scale."""
     x, y = points.mean(axis=0)
     return np.array([[1.0 / scale, 0.0, -x / scale], [0.0, 1.0 / scale, -y / scale], [0.0, 0.0, 1.0]])
+
+
+def scaled_pairs(a: Array, b: Array) -> tuple[Array, Array, Array, float]:
+    """Rows (N, 4) of centred and scaled points, the (3, 3) that did so to a and to b, and the one scale."""
+    scale = float(np.sqrt(spread(a) * spread(b)))
+    to_a, to_b = similarity_about(a, scale), similarity_about(b, scale)
+    rows = np.column_stack([a @ to_a[:2, :2] + to_a[:2, 2], b @ to_b[:2, :2] + to_b[:2, 2]])
+    return rows, to_a, to_b, scale

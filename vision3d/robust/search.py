@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError, ModelError, NotFiniteError, ShapeError, UnderConstrainedError
 from vision3d.robust.backends import Outside
+from vision3d.robust.curvature import covariance_by_differences
 from vision3d.robust.found import Found, relative_weights, result_of
 from vision3d.robust.model import RobustModel
 from vision3d.robust.result import RobustFit
@@ -47,7 +48,8 @@ def fit(
     Returns
     -------
     RobustFit
-        its model is (parameters,); its cov is all NaN, as a squared error says too little for one
+        its model is (parameters,); its cov, of these, is by differences of the squared errors where the model
+        has a fit and as many degrees of freedom as parameters, and else all NaN
 
     Raises
     ------
@@ -56,9 +58,30 @@ def fit(
     UnderConstrainedError
         where no sample determines a model: all of them are degenerate.
     """
-    found = search(model, data, settings, relative_weights(sigma, len(data)), rng)
-    unknown = np.full((model.parameters, model.parameters), np.nan)
-    return result_of(found, found.model, unknown)
+    weights = relative_weights(sigma, len(data))
+    found = search(model, data, settings, weights, rng)
+    cov = np.full((model.parameters, model.parameters), np.nan)
+    with model.functions() as f:
+        fitted = f.fit != 0
+    if fitted and model.freedom == model.parameters:
+        rows = checked_rows(model, data)
+        cov = covariance_by_differences(
+            lambda near: errors_under(model, rows, np.ones(len(rows)), near),
+            found.weights,
+            found.model,
+            found.variance(sigma),
+        )
+    return result_of(found, found.model, cov)
+
+
+def errors_under(model: RobustModel, rows: Array, weights: Array, given: Array) -> Array:
+    """Squared errors (N,) of rows under a model (parameters,), times the weights."""
+    from vision3d.kernels.robust_scoring import errors_of
+
+    errors = np.empty(len(rows))
+    with model.functions() as f:
+        errors_of(f.residuals, rows, weights, np.array(given, dtype=np.float64), errors)
+    return errors
 
 
 def search(
@@ -124,12 +147,8 @@ def assess(
     model: RobustModel, data: Array, settings: RansacSettings, weights: Array, given: Array, outside: Outside
 ) -> Found:
     """What the loop would say of a model (parameters,) that somebody else has found, left as it is."""
-    from vision3d.kernels.robust_scoring import errors_of
-
     rows = checked_rows(model, data)
-    errors, given = np.empty(len(rows)), np.array(given, dtype=np.float64)
-    with model.functions() as f:
-        errors_of(f.residuals, rows, weights, given, errors)
+    errors = errors_under(model, rows, weights, given)
     robust = settings.method == "lmeds" or outside.backend.endswith("LMEDS")
     threshold2 = median_threshold2(model, errors) if robust else settings.threshold**2
     inside = errors < threshold2

@@ -4,7 +4,7 @@ import ctypes
 
 import numpy as np
 import pytest
-from robust_worlds import corner_error_px, matches
+from robust_worlds import corner_error_px, matches, nees
 
 from sequential.errors import DataError, ModelError, NotFiniteError, ShapeError, UnderConstrainedError
 from vision3d.robust import CompiledModel, NumpyModel, RansacSettings, fit, fit_homography, fit_line
@@ -67,6 +67,44 @@ def test_a_model_without_a_fit_is_searched_for_all_the_same(rng):
     bare = NumpyModel("line", 2, 2, 3, solve=line_through, residuals=squared_distances)
     found = fit(bare, points, SETTINGS)
     assert found.count >= fit_line(points, SETTINGS).count - 10
+
+
+def circle_through(rows):
+    """Centre and radius of the circle through three points."""
+    system = np.column_stack([2.0 * rows, np.ones(3)])
+    if abs(np.linalg.det(system)) < 1e-9:
+        return []
+    x, y, rest = np.linalg.solve(system, np.sum(rows**2, axis=1))
+    return [[x, y, np.sqrt(rest + x * x + y * y)]]
+
+
+def from_circle(rows, model):
+    return (np.linalg.norm(rows - model[:2], axis=1) - model[2]) ** 2
+
+
+def better_circle(rows, weights, model):
+    """One Gauss-Newton step."""
+    off = rows - model[:2]
+    far = np.linalg.norm(off, axis=1)
+    slope = np.column_stack([-off / far[:, None], -np.ones(len(far))]) * np.sqrt(weights)[:, None]
+    return model - np.linalg.lstsq(slope, (far - model[2]) * np.sqrt(weights), rcond=None)[0]
+
+
+CIRCLE = NumpyModel(
+    "circle", 3, 2, 3, freedom=3, solve=circle_through, residuals=from_circle, fit=better_circle
+)
+
+
+@pytest.mark.slow
+def test_the_covariance_of_a_model_of_one_s_own_is_honest(rng, seeds):
+    told, truth = [], np.array([1.0, 2.0, 3.0])
+    for _ in range(3 * len(seeds)):
+        angle = rng.uniform(0.0, 4.0, 60)
+        points = truth[:2] + truth[2] * np.column_stack([np.cos(angle), np.sin(angle)])
+        points += rng.normal(0.0, 0.02, points.shape)
+        found = fit(CIRCLE, points, SETTINGS, rng=rng)
+        told.append(nees(found.model - truth, found.cov)[0])
+    assert abs(np.mean(told) - 1.0) < 0.1 + 4.0 * np.sqrt(2.0 / (3 * len(told)))
 
 
 def test_what_a_model_in_numpy_raises_is_raised(rng):
