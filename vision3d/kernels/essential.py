@@ -24,7 +24,7 @@ from vision3d.kernels.arrays import f0, f1, f2, i0, w1, w2
 from vision3d.kernels.plane_pose import cholesky, rotate_right, solve
 
 __all__ = [
-    "direction_derivatives",
+    "essential_information",
     "essential_residuals",
     "loss_of",
     "motion_of",
@@ -269,9 +269,11 @@ def refine_essential(data, weights, kind, scale, iterations_max, R, t, H):
     return cost, iteration
 
 
-@kernel(types.void(f2, f1, w2))
-def direction_derivatives(R, t, D):
-    """Fill D (5, 9): how E, row by row, moves with the tangent of a relative pose."""
-    E, basis = np.empty(9), np.empty((2, 3))
-    essential_of(R, t, E)
-    directions(R, t, E, basis, D)
+@kernel(types.boolean(f2, f1, f1, w2, w2))
+def essential_information(data, weights, E, H, D):
+    """Fill the information H (5, 5) of E's motion, and D (5, 9), how E moves along its tangent."""
+    R, t, g, basis = np.empty((3, 3)), np.empty(3), np.empty(5), np.empty((2, 3))
+    if not motion_of(E, R, t):
+        return False
+    normal_equations(data, weights, PLAIN, 1.0, R, t, basis, D, H, g)
+    return True

@@ -5,10 +5,12 @@ found.model, found.cov, found.inliers, found.stopped          # "confidence reac
 """
 
 from vision3d.robust.compare import BackendRow, compare_backends, table_of
+from vision3d.robust.essential import fit_essential
 from vision3d.robust.flats import fit_line, fit_plane
 from vision3d.robust.fundamental import eight_point, epipolar_distances, fit_fundamental
 from vision3d.robust.homography import fit_homography, transfer, transfer_cov
 from vision3d.robust.model import Addresses, CompiledModel, NumpyModel, RobustModel
+from vision3d.robust.pose import fit_pose
 from vision3d.robust.result import RobustFit
 from vision3d.robust.search import fit
 from vision3d.robust.settings import RansacSettings
@@ -26,10 +28,12 @@ __all__ = [
     "eight_point",
     "epipolar_distances",
     "fit",
+    "fit_essential",
     "fit_fundamental",
     "fit_homography",
     "fit_line",
     "fit_plane",
+    "fit_pose",
     "fit_similarity",
     "table_of",
     "transfer",

@@ -26,7 +26,7 @@ from vision3d.two_view.stories import Told, tell
 
 __all__ = ["estimate_two_view"]
 
-FEWEST = 8
+FEWEST, MAX_SAMPLES = 8, 20_000
 THRESHOLD_PX, THRESHOLD_SIGMAS = 1.0, 3.0
 
 
@@ -38,6 +38,8 @@ def estimate_two_view(
     *,
     sigma_px: Any = None,
     threshold_px: float | None = None,
+    best_first: bool = False,
+    max_samples: int = MAX_SAMPLES,
     rng: np.random.Generator | None = None,
 ) -> TwoView:
     """Find how camera b stands to camera a, up to the length of the translation.
@@ -49,6 +51,8 @@ def estimate_two_view(
     sigma_px : standard deviation of a coordinate: one number, (N,) for both sides, or (N, 2) for a and b;
         None: one number, from the residuals
     threshold_px : Sampson distance up to which a pair agrees; None: 3 sigmas, or 1 px where sigma is unknown
+    best_first : the pixels are sorted, surest matches first, and samples are drawn from those first (PROSAC)
+    max_samples : of five pairs, at most
     rng : of the search; None: the same every time
 
     Raises
@@ -67,7 +71,7 @@ def estimate_two_view(
             "from chance: match more features, or look whether the cameras are those of the pictures"
         )
         return nothing("too few", words, len(seen), 0, np.inf)
-    readings = read_pairs(rows, threshold, camera_b.size, rng)
+    readings = read_pairs(rows, threshold, camera_b.size, rng, budget=max_samples, best_first=best_first)
     chance, by_chance = _by_chance(readings, camera_b.size)
     if chance > CHANCE_LOG10:
         words = (

@@ -18,7 +18,7 @@ from vision3d.camera import Array
 __all__ = ["Noise", "fit_noise"]
 
 FREEDOMS: Final = (1.0, 2.0, 3.0, 4.0, 6.0, 10.0, 30.0, 100.0)
-ROUNDS = 40
+ROUNDS, SETTLED = 25, 1e-4
 LEAST = 1e-9
 
 
@@ -56,8 +56,10 @@ def fit_noise(squared: Array, dims: int = 1) -> Noise:
     for freedom in FREEDOMS:
         variance = float(np.median(squared))
         for _ in range(ROUNDS):
-            weights = (freedom + dims) / (freedom + squared / variance)
-            variance = float(np.mean(weights * squared)) / dims
+            before = variance
+            variance = (freedom + dims) / dims * float(np.mean(squared / (freedom + squared / before)))
+            if abs(variance - before) < SETTLED * before:
+                break
         norm = gammaln(0.5 * (freedom + dims)) - gammaln(0.5 * freedom)
         norm -= 0.5 * dims * np.log(freedom * np.pi * variance)
         tails = 0.5 * (freedom + dims) * np.log1p(squared / (freedom * variance))

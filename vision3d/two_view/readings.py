@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vision3d.camera import Array
+from vision3d.robust.search import Found
 from vision3d.two_view.motion import decompose_essential, motion
 from vision3d.two_view.noise import fit_noise
 from vision3d.two_view.planes import PlaneMotion, decompose_homography
@@ -14,14 +15,17 @@ from vision3d.two_view.refinement import (
     refine_motion,
     sampson_distances,
 )
-from vision3d.two_view.search import search_rays
+from vision3d.two_view.search import samples_for, search_rays
 from vision3d.two_view.selection import Criterion, choose_model
 
 __all__ = ["Readings", "read_pairs", "robust_sigma", "settled"]
 
-CHI2_MEDIAN = {1: 0.4549364, 2: 1.3862944}
-ENOUGH = 10.0
-ROUNDS, FEWEST = 4, 6
+CHI2_MEDIAN = 0.4549364
+CLIPPINGS, WITHIN2, CLIPPED = 5, 9.0, 0.9733
+"""Of chi² with one degree of freedom: the mean below nine is a little less than one."""
+ROUNDS, FEWEST, AGAIN = 6, 6, 250
+WORTH = 0.5
+"""Share of the pairs in space that a plane or a turn must hold to be worth a name."""
 SEARCHES = 5
 """For an essential matrix: where a plane holds most pairs, a search may end in a motion that fits it only."""
 AHEAD = np.array([0.0, 0.0, 1.0])
@@ -60,26 +64,36 @@ class Readings:
     stopped: str
 
 
-def robust_sigma(squared: Array, parameters: int, dims: int = 1) -> float:
-    """Noise of a coordinate from squared distances of pairs that agree, by their median; inf from too few."""
-    spare = len(squared) - parameters / dims
-    if spare < ENOUGH:
-        return np.inf
-    median = float(np.median(squared)) / CHI2_MEDIAN[dims]
-    return max(SIGMA_LEAST, float(np.sqrt(median * len(squared) / spare)))
+def robust_sigma(squared: Array, parameters: int) -> float:
+    """Noise of a coordinate, from squared distances of pairs that agree: root mean square within 3 sigmas."""
+    spare = len(squared) - parameters
+    if spare < 1:
+        return SIGMA_LEAST
+    variance = float(np.median(squared)) / CHI2_MEDIAN
+    for _ in range(CLIPPINGS):
+        variance = float(np.mean(squared[squared <= WITHIN2 * variance])) / CLIPPED
+    return max(SIGMA_LEAST, float(np.sqrt(variance * len(squared) / spare)))
 
 
-def read_pairs(rows: Array, threshold: float, size: tuple[int, int], rng: np.random.Generator) -> Readings:
+def read_pairs(
+    rows: Array,
+    threshold: float,
+    size: tuple[int, int],
+    rng: np.random.Generator,
+    *,
+    budget: int,
+    best_first: bool = False,
+) -> Readings:
     """Search for every model, and refine each motion that one of them stands for.
 
     `size` is the width and height of picture b, px: what chance has to choose from.
     """
-    homography, rotation = (search_rays(rows, kind, threshold, rng) for kind in ("homography", "rotation"))
-    essentials = [
-        found
-        for _ in range(SEARCHES)
-        if (found := search_rays(rows, "essential", threshold, rng)) is not None
-    ]
+    essentials = _essentials(rows, threshold, rng, budget=budget, best_first=best_first)
+    share = max((float(np.mean(one.errors2 < threshold**2)) for one in essentials), default=1.0)
+    homography, rotation = (
+        search_rays(rows, kind, threshold, rng, budget=samples_for(WORTH * share, kind, budget))
+        for kind in ("homography", "rotation")
+    )
     never = np.full(len(rows), np.inf)
     planes: tuple[PlaneMotion, ...] = ()
     H, flat = np.eye(3), never
@@ -92,9 +106,7 @@ def read_pairs(rows: Array, threshold: float, size: tuple[int, int], rng: np.ran
     starts = [motion(one.R, one.t) for one in planes if np.linalg.norm(one.t) > 0.0]
     starts += [decompose_essential(found.model.reshape(3, 3))[0] for found in essentials]
     b_T_a, squared = _best_motion(rows, threshold, starts) if starts else (motion(R, AHEAD), never)
-    sigma = min(
-        robust_sigma(squared[squared < threshold**2], 5), robust_sigma(flat[flat < 2.0 * threshold**2], 8, 2)
-    )
+    sigma = robust_sigma(squared[squared < threshold**2], 5)
     told = [found for found in (*essentials, homography, rotation) if found is not None]
     distances = {"general": squared, "planar": flat, "pure rotation": turned}
     return Readings(
@@ -102,6 +114,21 @@ def read_pairs(rows: Array, threshold: float, size: tuple[int, int], rng: np.ran
         choose_model(distances, sigma, threshold, size),
         sum(found.iterations for found in told), told[0].stopped if told else "nothing to search",
     )  # fmt: skip
+
+
+def _essentials(
+    rows: Array, threshold: float, rng: np.random.Generator, *, budget: int, best_first: bool
+) -> list[Found]:
+    """Essential matrices of several searches, where the first one ended early."""
+    found: list[Found] = []
+    for _ in range(SEARCHES):
+        one = search_rays(rows, "essential", threshold, rng, budget=budget, best_first=best_first)
+        if one is not None:
+            found.append(one)
+        if one is None or one.stopped == "budget spent":
+            break
+        budget = min(budget, 4 * max(one.iterations, AGAIN))
+    return found
 
 
 def _best_motion(rows: Array, threshold: float, starts: list[Array]) -> tuple[Array, Array]:
