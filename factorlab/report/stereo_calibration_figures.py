@@ -29,7 +29,7 @@ def rectified_pair(done: CalibratedStereo) -> Figure | None:
     images = {pair.name: (pair.left, pair.right) for pair in done.pictures.pairs}
     fit = done.calibration
     names = [fit.pairs[v].name for v in fit.whole if None not in images.get(fit.pairs[v].name, (None, None))]
-    if not names or fit.rig.left.size != fit.rig.right.size:
+    if not names:
         return None
     left, right = images[names[len(names) // 2]]
     assert left is not None  # noqa: S101 - chosen so
@@ -133,10 +133,9 @@ def depth_spread(done: CalibratedStereo) -> Figure | None:
     columns = len(np.unique(sure.pixels[:, 0]))
     x, y = sure.pixels[:columns, 0], sure.pixels[::columns, 1]
     values = sure.row_std_px.reshape(-1, columns)
-    levels = np.array([0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0])
-    shown = field.contourf(
-        x, y, np.clip(values, levels[0], levels[-1]), levels=levels, cmap="viridis", norm="log"
-    )
+    levels = _levels(values)
+    clipped = np.clip(values, levels[0], levels[-1])
+    shown = field.contourf(x, y, clipped, levels=levels, cmap="viridis", norm="log")
     lines = field.contour(x, y, values, levels=levels, colors="white", linewidths=0.6)
     field.clabel(lines, fmt=lambda value: f"{value:g}", fontsize=8)
     figure.colorbar(shown, ax=field, shrink=0.85, label="σ of rows, px", format="%g", ticks=levels)
@@ -163,6 +162,16 @@ def depth_spread(done: CalibratedStereo) -> Figure | None:
 
 
 MATCHED_PX = 0.25  # what a dense matcher reaches on good texture
+
+
+def _levels(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """1, 2, 3, 5 of every decade, from below the smallest value to above the largest; twelve at most."""
+    series = (np.array([1.0, 2.0, 3.0, 5.0])[None] * 10.0 ** np.arange(-5, 4)[:, None]).ravel()
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    first = max(0, int(np.searchsorted(series, low, side="right")) - 1)
+    last = min(len(series) - 1, int(np.searchsorted(series, high)))
+    levels: NDArray[np.float64] = series[first : max(last, first + 2) + 1][:12]
+    return levels
 
 
 def _rows(done: CalibratedStereo) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

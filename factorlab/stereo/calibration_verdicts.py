@@ -137,12 +137,12 @@ def _rows(done: CalibratedStereo) -> Verdict:
     found = done.measured
     status = judged(found.row_px, GOOD_ROWS, FAIR_ROWS)
     worst = int(np.nanargmax(found.pair_row_px))
+    kind = "columns" if done.calibration.rig.is_vertical else "rows"
     meaning = (
-        f"how far apart the rows of a corner are in the rectified images; worst "
+        f"how far apart the {kind} of a corner are in the rectified images; worst "
         f"{found.pair_row_px[worst]:.3f} px in {done.calibration.pairs[worst].name}"
     )
     action = "" if status == "PASS" else "look at the pairs with the largest bars below"
-    kind = "columns" if done.calibration.rig.is_vertical else "rows"
     return Verdict(f"rectified {kind} apart, RMS", found.row_px, None, status, meaning, action, "px")
 
 

@@ -84,7 +84,7 @@ def _masks(grey: Grey, *, dark: bool) -> Iterator[Grey]:
     kind = cv2.THRESH_BINARY_INV if dark else cv2.THRESH_BINARY
     yield np.asarray(cv2.threshold(grey, 0, 255, kind | cv2.THRESH_OTSU)[1], dtype=np.uint8)
     for part in BLOCKS:
-        width = max(grey.shape) // part | 1
+        width = max(3, max(grey.shape) // part | 1)
         offset = 5.0 if dark else -5.0
         adaptive = cv2.adaptiveThreshold(grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, kind, width, offset)
         yield np.asarray(adaptive, dtype=np.uint8)

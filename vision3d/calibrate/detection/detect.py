@@ -27,6 +27,8 @@ __all__ = ["detect_view", "detect_views", "grey_of"]
 Image = NDArray[np.generic]
 Outcome = tuple[View, ViewAudit, bool] | Missed
 Progress = Callable[[int, str], None]
+SMALLEST_PX = 16
+"""Side of an image below which nothing is looked for: OpenCV's thresholds take windows of an image's size."""
 
 
 def detect_views(
@@ -117,6 +119,9 @@ def grey_of(image: Image, name: str = "image") -> NDArray[np.uint8]:
 
 
 def _find(grey: NDArray[np.uint8], board: Board) -> Found | NotFound:
+    if min(grey.shape) < SMALLEST_PX:
+        width, height = grey.shape[::-1]
+        return NotFound(reason=f"{width}x{height} px are too few to show a {board.name}")
     if isinstance(board, Checkerboard):
         return find_checkerboard(grey, board)
     if isinstance(board, CharucoBoard):
