@@ -13,7 +13,7 @@ from vision3d.features.features import Features, Matches
 from vision3d.features.guided import guided_matches
 from vision3d.features.matching import match_features
 from vision3d.features.refining import refine_matches
-from vision3d.features.spreading import spread_rows
+from vision3d.features.spreading import spread_levels, spread_rows
 
 __all__ = [
     "KINDS",
@@ -23,6 +23,7 @@ __all__ = [
     "guided_matches",
     "match_features",
     "refine_matches",
+    "spread_levels",
     "spread_rows",
     "supporters",
 ]

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import DataError, ModelError, ShapeError
 from vision3d.features.features import Array, Features
-from vision3d.features.spreading import spread_rows
+from vision3d.features.spreading import spread_levels, spread_rows
 
 __all__ = ["KINDS", "Kind", "detect_features"]
 
@@ -75,6 +75,9 @@ def detect_features(
     else:
         found = corner_features.described(grey, allowed, kind, more)
     height, width = grey.shape
+    if spread and kind == "orb":
+        scale = np.round(found.size_px / found.size_px.min(initial=np.inf), 4)
+        return found.take(spread_levels(found.pixels, found.response, scale, (width, height), count))
     if spread:
         return found.take(spread_rows(found.pixels, found.response, (width, height), count))
     return found.take(np.argsort(-found.response, kind="stable")[:count])

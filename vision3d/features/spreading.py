@@ -9,15 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import ShapeError
 
-__all__ = ["spread_rows"]
+__all__ = ["spread_levels", "spread_rows"]
 
-PER_CELL = 8  # features a cell would hold if all cells had as many
+SURE = 0.5  # share that the strongest have, wherever they are
+PER_CELL = 20  # features a cell would hold if all cells had as many
 
 
 def spread_rows(
     pixels: ArrayLike, response: ArrayLike, size: tuple[int, int], count: int
 ) -> NDArray[np.int64]:
-    """Choose features cell by cell: the strongest of every cell first, then every second, until enough.
+    """Choose half by strength, and half cell by cell: the best of every cell, then the second best.
 
     Parameters
     ----------
@@ -43,5 +44,33 @@ def spread_rows(
     grouped = order[np.argsort(cell[order], kind="stable")]  # cell by cell, strongest first within each
     starts = np.flatnonzero(np.r_[True, np.diff(cell[grouped]) != 0])
     turn = np.arange(len(grouped)) - np.repeat(starts, np.diff(np.r_[starts, len(grouped)]))
+    # the strongest are those found again most often
+    turn[np.isin(grouped, order[: round(SURE * count)])] = -1
     chosen = grouped[np.lexsort((-strong[grouped], turn))[:count]]
     return np.asarray(chosen[np.argsort(-strong[chosen], kind="stable")], dtype=np.int64)
+
+
+def spread_levels(
+    pixels: ArrayLike, response: ArrayLike, scale: ArrayLike, size: tuple[int, int], count: int
+) -> NDArray[np.int64]:
+    """The same level by level of a pyramid, each with a share of the features that falls as its side does.
+
+    Scores of different levels cannot be compared; what one level lacks goes to the next finer one.
+
+    Parameters
+    ----------
+    scale : (N,) how many pixels of the image one of the feature's level is
+    """
+    at, strong = np.asarray(pixels, dtype=np.float64), np.asarray(response, dtype=np.float64)
+    steps = np.asarray(scale, dtype=np.float64)
+    levels = np.unique(steps)[::-1]
+    chosen: list[NDArray[np.int64]] = []
+    left = count
+    for k, level in enumerate(levels):
+        rows = np.flatnonzero(steps == level)
+        quota = math.ceil(left * (1.0 / level) / float((1.0 / levels[k:]).sum()))
+        some = rows[spread_rows(at[rows], strong[rows], size, quota)]
+        chosen.append(some)
+        left -= len(some)
+    every = np.concatenate([np.empty(0, np.int64), *chosen])
+    return np.asarray(every[np.argsort(-strong[every], kind="stable")], dtype=np.int64)

@@ -6,7 +6,7 @@ import pytest
 from warped_photos import drawing, moved, slopes, warped
 
 from sequential.errors import DataError, ModelError, NotFiniteError, ShapeError
-from vision3d.features import KINDS, Features, detect_features, match_features, spread_rows
+from vision3d.features import KINDS, Features, detect_features, match_features, spread_levels, spread_rows
 
 BARS = {"sift": 0.25, "orb": 0.55, "fast": 0.5, "harris": 0.45, "fast-patch": 0.5, "harris-patch": 0.45}
 
@@ -117,17 +117,31 @@ def test_spreading_reaches_what_the_strongest_leave_out(rng):
 
     heaped = detect_features(image, "orb", count=300, spread=False)
     spread = detect_features(image, "orb", count=300)
-    assert outside(heaped) < 0.3
-    assert outside(spread) > 0.5
+    assert outside(heaped) < 0.02
+    assert outside(spread) > 0.15
 
 
-def test_spread_rows_take_the_strongest_of_each_cell(rng):
+def test_spread_rows_take_the_strongest_and_the_best_of_each_cell(rng):
     pixels, response = rng.uniform(0, 100, (5000, 2)), rng.random(5000)
+    response[(pixels < 50).all(axis=1)] += 1.0
     rows = spread_rows(pixels, response, (100, 100), 200)
     assert len(set(rows.tolist())) == 200
-    assert response[rows].min() > 0.9
-    cells = {(int(x // 20), int(y // 20)) for x, y in pixels[rows]}
-    assert len(cells) == 25
+    assert set(np.argsort(-response)[:100].tolist()) < set(rows.tolist())
+    cells = {(int(x // 34), int(y // 34)) for x, y in pixels[rows]}
+    assert len(cells) == 9
+    assert response[rows].min() > 0.5
+
+
+def test_spread_levels_give_every_level_its_share(rng):
+    pixels, response = rng.uniform(0, 100, (4000, 2)), rng.random(4000)
+    scale = np.repeat([1.0, 2.0, 4.0], [3000, 990, 10])
+    response[scale == 1.0] += 10.0
+    rows = spread_levels(pixels, response, scale, (100, 100), 140)
+    assert len(set(rows.tolist())) == 140
+    counts = [int((scale[rows] == one).sum()) for one in (1.0, 2.0, 4.0)]
+    # of 140, 20 would be of the coarsest, which has 10; the rest falls to the others, two to one
+    assert counts == [86, 44, 10]
+    assert (np.diff(response[rows]) <= 0).all()
     assert np.array_equal(spread_rows(pixels[:7], response[:7], (100, 100), 20), np.argsort(-response[:7]))
 
 
