@@ -99,3 +99,14 @@ def _arc_about(count, target, distance, spread_rad):
 
 def _turn(angle_rad):
     return np.array([np.cos(0.5 * angle_rad), 0.0, np.sin(0.5 * angle_rad), 0.0, 0.0, 0.0, 0.0])
+
+
+def rendered_desk(seed):
+    """Six pictures of 640x480 about a desk by name, and their true poses."""
+    from vision3d.render import desk, render_scene
+
+    rng = np.random.default_rng(seed)
+    scene, poses = desk(rng), _arc_about(6, (0.0, 0.1, 1.5), 1.6, 0.8)
+    names = [f"desk{k}.png" for k in range(len(poses))]
+    images = [render_scene(CAMERA, pose, scene, rng=rng).image for pose in poses]
+    return dict(zip(names, images, strict=True)), dict(zip(names, poses, strict=True))

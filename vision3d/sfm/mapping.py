@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vision3d.sfm.library import colmap
-from vision3d.sfm.patience import Patience
+from vision3d.sfm.patience import Patience, Stopped
 from vision3d.sfm.settings import SfmSettings
 
 if TYPE_CHECKING:
@@ -59,7 +59,13 @@ def map_pictures(
                     database, folder, folder, incremental, next_image_callback=grown, cancellation_token=token
                 )
 
-            models = patience.run(grow)
+            snapshots = Path(folder) / "snapshots"
+            snapshots.mkdir()
+            incremental.snapshot_path, incremental.snapshot_frames_freq = snapshots, 1
+            try:
+                models = patience.run(grow)
+            except Stopped:
+                models = _latest(snapshots)
             if not _useful(models) and not patience.over:
                 # a drive straight ahead, or a short step: less is asked of the pair to start from
                 incremental.mapper.init_max_forward_motion = 1.0
@@ -67,6 +73,12 @@ def map_pictures(
                 placed[0] = 2
                 models = patience.run(grow)
     return sorted(_useful(models), key=lambda one: (-one.num_reg_images(), -one.num_points3D()))
+
+
+def _latest(snapshots: Path) -> dict[int, pycolmap.Reconstruction]:
+    """The model as it was before the work was ended; COLMAP names snapshots by their times."""
+    whole = sorted(path.parent for path in snapshots.glob("*/points3D.bin"))
+    return {0: colmap().Reconstruction(whole[-1])} if whole else {}
 
 
 def _useful(models: dict[int, pycolmap.Reconstruction]) -> list[pycolmap.Reconstruction]:

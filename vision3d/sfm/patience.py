@@ -40,7 +40,13 @@ class Patience:
             raise Stopped
 
     def run(self, call: Callable[[Any], T]) -> T:
-        """The result of `call(token)`; the token is cancelled when the work is to end."""
+        """The result of `call(token)`; the token is cancelled when the work is to end.
+
+        Raises
+        ------
+        Stopped
+            where the call gave up because of that.
+        """
         token = colmap().CancellationToken()
         outcome: list[T] = []
         faults: list[BaseException] = []
@@ -62,6 +68,8 @@ class Patience:
             token.cancel()
             thread.join()
             raise
+        if faults and token.is_cancelled:
+            raise Stopped from faults[0]
         if faults:
             raise faults[0]
         return outcome[0]

@@ -119,6 +119,20 @@ def test_work_that_was_ended_goes_on(folder, tmp_path):
     assert [path.stat().st_mtime_ns for path in kept] == stamps
 
 
+def test_a_model_that_was_ended_holds_what_had_its_place(tmp_path):
+    """A stop while the model grows gives the model so far."""
+    stop = threading.Event()
+
+    def progress(what, done, total):
+        if what == "growing" and done >= 4:
+            stop.set()
+
+    model = reconstruct(rendered("desk")[0], camera=SMALL, stop=stop, progress=progress)
+    assert 2 <= len(model) <= 5
+    assert len(model.points) > 100
+    assert len(model) + len(model.missing) == 5
+
+
 @pytest.mark.parametrize(
     "changes", [{"mapper": "magic"}, {"lens": "thin12"}, {"max_size": 3}, {"sharing": "all"}]
 )
