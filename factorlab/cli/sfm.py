@@ -26,6 +26,8 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
                  help="Known intrinsics, in any format of `factorlab camera`; they are kept."),
     click.option("--which", metavar="NAME", help="The camera in that file, where there are several."),
     click.option("--global", "whole", is_flag=True, help="Solve for all pictures at once (GLOMAP)."),
+    click.option("--mapper", type=click.Choice(("incremental", "global", "own")), metavar="NAME",
+                 help="COLMAP's incremental or global one, or our own.  [default: incremental]"),
     click.option("--lens", type=click.Choice(LENSES), default="brown1", show_default=True,
                  help="Lens model to calibrate where no --camera is given."),
     click.option("--sharing", type=click.Choice(("auto", "one", "each")), default="auto", show_default=True,
@@ -103,7 +105,7 @@ def _job(options: dict[str, Any]) -> SfmJob:
 
     settings = SfmSettings(
         lens=options["lens"], sharing=options["sharing"],
-        mapper="global" if options["whole"] else "incremental",
+        mapper=options["mapper"] or ("global" if options["whole"] else "incremental"),
         max_size=options["max_size"], max_features=options["max_features"], seed=options["seed"],
         threads=options["threads"],
     )  # fmt: skip

@@ -81,6 +81,8 @@ def reconstruct(
         database = folder / "pictures.db"
         fill_database(database, pictures, chosen)
         match_all(database, pictures, chosen, patience, progress)
+        if chosen.mapper == "own":
+            return _grown(database, pictures, left_out, chosen, patience, progress)
         models = map_pictures(database, len(pictures), chosen, patience, progress)
         if not models:
             patience.check()
@@ -100,6 +102,28 @@ def _of_the_camera(
         except DataError as error:
             left_out[picture.name] = str(error)
     return kept, left_out
+
+
+def _grown(
+    database: Path,
+    pictures: Sequence[PictureFeatures],
+    left_out: dict[str, str],
+    settings: SfmSettings,
+    patience: Patience,
+    progress: Progress,
+) -> Reconstruction:
+    """The model of our own mapper, told as those of COLMAP's are."""
+    from vision3d.sfm.own_mapper import known_cameras, map_by_growing
+
+    found = map_by_growing(database, pictures, settings, patience, progress)
+    known = None if found is None else known_cameras(database, found)
+    graph = view_graph_of(database, pictures, known, settings.seed)
+    placed = set() if found is None else {k for k, one in enumerate(pictures) if one.name in found.names}
+    others = [k for k in range(len(pictures)) if k not in placed]
+    missing = (*left_out.items(), *((pictures[k].name, why_missing(graph, k, placed)) for k in others))
+    if found is None:
+        raise NoModelError(why_no_model(graph), graph, missing)
+    return found.replaced(missing=missing, graph=graph)
 
 
 def _told(

@@ -9,7 +9,7 @@ from vision3d.camera import Camera
 
 __all__ = ["LENS_MODELS", "MAPPERS", "SfmSettings"]
 
-MAPPERS = ("incremental", "global")
+MAPPERS = ("incremental", "global", "own")
 LENS_MODELS = {
     "pinhole": "SIMPLE_PINHOLE",
     "brown1": "SIMPLE_RADIAL",
@@ -30,7 +30,8 @@ class SfmSettings:
     lens : of a camera that is calibrated: one of `LENS_MODELS`
     sharing : which pictures have one camera: "auto" goes by size and by what EXIF says of camera and zoom,
         "one" by size only, "each" gives every picture its own
-    mapper : "incremental" grows from two views, "global" solves for all at once
+    mapper : "incremental" grows from two views, "global" solves for all at once; "own" grows
+        with the solvers of this package instead of COLMAP's
     max_size : features are sought in pictures reduced to this longer side, px
     max_features : kept of each picture, the largest first
     seed : of everything that draws at random
