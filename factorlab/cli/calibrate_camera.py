@@ -9,31 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factorlab.cli.board_options import BOARD_OPTIONS, board_of
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.progress import bar
 from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option, with_options
 
 if TYPE_CHECKING:
     from factorlab.camera import CameraSettings
-    from vision3d.boards import Board
 
-__all__ = ["KINDS", "LENSES", "board_of", "camera"]
+__all__ = ["LENSES", "camera"]
 
-KINDS = ("checkerboard", "charuco", "circles", "acircles", "markers")
 LENSES = ("auto", "pinhole", "brown1", "brown2", "brown4", "brown5", "rational8", "thin12", "fisheye4")
 
 
 OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.argument("sources", metavar="IMAGES…", nargs=-1, required=True),
-    click.option("--board", "board_text", metavar="COLSxROWS", required=True,
-                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles, markers."),
-    click.option("--square", metavar="LENGTH", required=True,
-                 help="Side of a square or of a marker, or distance of circles: 25mm, 2.5cm, 0.025m."),
-    click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
-                 help="What is on the board."),
-    click.option("--marker", metavar="LENGTH",
-                 help="Markers of a ChArUco board: 18mm, 0.75 squares by default; gap of markers."),
-    click.option("--dictionary", metavar="NAME", help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
+    *BOARD_OPTIONS,
     click.option("--lens", type=click.Choice(LENSES), default="auto", show_default=True,
                  help="Lens model; auto takes the one that predicts pictures best that it has not seen."),
     click.option("--board-shape", type=click.Choice(("auto", "flat", "bent")), default="auto",
@@ -110,27 +101,3 @@ def _settings(options: dict[str, Any]) -> CameraSettings:
         compare=options["compare"],
         next_pose=options["next_pose"],
     )
-
-
-def board_of(options: dict[str, Any]) -> Board:
-    """The board of --board, --square, --kind, --marker and --dictionary.
-
-    Raises
-    ------
-    click.UsageError
-        where they do not go together: that is the command line's fault.
-    """
-    from sequential.errors import FactorlabError
-    from vision3d.boards import board_from_text
-
-    if options["kind"] not in ("charuco", "markers"):
-        for name in ("marker", "dictionary"):
-            if options[name] is not None:
-                raise click.UsageError(f"--{name} goes with --kind charuco or markers")
-    try:
-        return board_from_text(
-            options["board_text"], kind=options["kind"], square=options["square"],
-            marker=options["marker"], dictionary=options["dictionary"] or "4x4_50",
-        )  # fmt: skip
-    except FactorlabError as error:
-        raise click.BadParameter(str(error), param_hint="--board") from error

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factorlab.cli.calibrate_camera import KINDS, LENSES
+from factorlab.cli.board_options import BOARD_OPTIONS, board_of
+from factorlab.cli.calibrate_camera import LENSES
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.progress import bar
 from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option, with_options
@@ -23,15 +24,7 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 
 OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.argument("sources", metavar="LEFT RIGHT", nargs=-1, required=True),
-    click.option("--board", "board_text", metavar="COLSxROWS", required=True,
-                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles, markers."),
-    click.option("--square", metavar="LENGTH", required=True,
-                 help="Side of a square or of a marker, or distance of circles: 25mm, 2.5cm, 0.025m."),
-    click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
-                 help="What is on the board."),
-    click.option("--marker", metavar="LENGTH",
-                 help="Markers of a ChArUco board: 18mm, 0.75 squares by default; gap of markers."),
-    click.option("--dictionary", metavar="NAME", help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
+    *BOARD_OPTIONS,
     click.option("--lens", type=click.Choice(LENSES), default="auto", show_default=True,
                  help="Lens model of both; auto takes for each the one that predicts best."),
     click.option("--left-camera", type=FILE, metavar="FILE",
@@ -103,8 +96,7 @@ def stereo(sources: tuple[str, ...], **options: Any) -> int:
 
 
 def _settings(options: dict[str, Any]) -> StereoSettings:
-    """The board and the rest; what is wrong with the board's options is the command line's fault."""
-    from factorlab.cli.calibrate_camera import board_of
+    """The board and the rest."""
     from factorlab.stereo.calibrated import StereoSettings
 
     return StereoSettings(

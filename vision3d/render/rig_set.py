@@ -82,6 +82,7 @@ def render_board_pairs(
         )
     ]
     chosen = np.array(poses)
-    for array in (chosen, *sides[0], *sides[1]):
-        array.setflags(write=False)
+    chosen.setflags(write=False)
+    for image in (*sides[0], *sides[1]):
+        image.setflags(write=False)
     return RenderedPairs(rig, board, sides[0], sides[1], chosen)
