@@ -17,7 +17,7 @@ from vision3d.kernels.arrays import b0, f1, f2, w1, w2
 from vision3d.kernels.plane_pose import cholesky, solve
 from vision3d.kernels.robust_calls import FIT, RESIDUALS, SOLVE
 
-__all__ = ["homography_fit", "homography_residuals", "homography_solve", "normal_equations"]
+__all__ = ["homography_fit", "homography_residuals", "homography_solve", "normal_equations", "unit_step"]
 
 FLAT = 1e-5  # twice the area of a triangle that is taken for a line
 FAR = 1e30
@@ -173,16 +173,13 @@ def fix_scale(N, H):
             N[row, column] += mean * H[row] * H[column]
 
 
-@entry(FIT)
-def homography_fit(address, n, k, weight, model):
-    """One Gauss-Newton step of the weighted squared transfer errors, at right angles to the scale of H."""
-    data, weights, H = carray(address, (n, 4)), carray(weight, (n,)), carray(model, (9,))
-    N, L, g, step = np.empty((9, 9)), np.empty((9, 9)), np.empty(9), np.empty(9)
-    if not normal_equations(data, weights, H, N, g):
-        return 0
+@inlined
+def unit_step(N, g, H):
+    """Solve the normal equations and step, at right angles to the scale of H; false where singular."""
+    L, step = np.empty((9, 9)), np.empty(9)
     fix_scale(N, H)
     if math.isnan(cholesky(N, 0, 0.0, L)):
-        return 0
+        return False
     solve(L, g, 0, step)
     size = 0.0
     for e in range(9):
@@ -190,4 +187,12 @@ def homography_fit(address, n, k, weight, model):
         size += step[e] * step[e]
     for e in range(9):
         H[e] = step[e] / math.sqrt(size)
-    return 1
+    return True
+
+
+@entry(FIT)
+def homography_fit(address, n, k, weight, model):
+    """One Gauss-Newton step of the weighted squared transfer errors."""
+    data, weights, H = carray(address, (n, 4)), carray(weight, (n,)), carray(model, (9,))
+    N, g = np.empty((9, 9)), np.empty(9)
+    return 1 if normal_equations(data, weights, H, N, g) and unit_step(N, g, H) else 0

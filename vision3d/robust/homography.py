@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sequential.errors import ModelError
 from vision3d.robust.backends import search_outside
 from vision3d.robust.covariance import pseudo_inverse, unit_norm
 from vision3d.robust.found import Found, relative_weights, result_of
@@ -16,7 +18,7 @@ from vision3d.robust.scaling import paired_points, scaled_pairs
 from vision3d.robust.search import assess, search
 from vision3d.robust.settings import DEFAULT, RansacSettings
 
-__all__ = ["HOMOGRAPHY", "fit_homography", "transfer", "transfer_cov"]
+__all__ = ["HOMOGRAPHY", "SAMPSON_HOMOGRAPHY", "fit_homography", "transfer", "transfer_cov"]
 
 Array = NDArray[np.float64]
 
@@ -34,11 +36,26 @@ HOMOGRAPHY = CompiledModel(
 )
 
 
+def _load_sampson() -> Addresses:
+    from vision3d.kernels import robust_homography, robust_homography_sampson
+
+    return Addresses(
+        robust_homography.homography_solve.address,
+        robust_homography_sampson.sampson_residuals.address,
+        robust_homography_sampson.sampson_fit.address,
+    )
+
+
+SAMPSON_HOMOGRAPHY = replace(HOMOGRAPHY, load=_load_sampson)
+MODELS = {"transfer": HOMOGRAPHY, "sampson": SAMPSON_HOMOGRAPHY}
+
+
 def fit_homography(
     a: Array,
     b: Array,
     settings: RansacSettings = DEFAULT,
     *,
+    error: Literal["transfer", "sampson"] = "transfer",
     sigma: Array | float | None = None,
     rng: np.random.Generator | None = None,
 ) -> RobustFit:
@@ -47,8 +64,11 @@ def fit_homography(
     Parameters
     ----------
     a, b : (N, 2) px, matched row by row; best first for PROSAC's order
-    settings : the threshold is a distance in b, in px
-    sigma : px in b, of each match (N,) or of all; without it the covariance is scaled by the errors seen
+    settings : the threshold is of that error, in px
+    error : "transfer" is the distance in b of the point carried over: the noise is that of b, as where a is a
+        drawing; "sampson" the distance in both images from the nearest exact match: both are as noisy.  They
+        differ where the scale does, as in a plane seen at a slant
+    sigma : px, of a coordinate of each match (N,) or of all; without it the errors seen give it
     rng : where the seed comes from; the same without it every time
 
     Returns
@@ -67,21 +87,23 @@ def fit_homography(
 
     Notes
     -----
-    Minimises the distances in b (Hartley, Zisserman 2004, section 4.2.2), as is best where the noise of b
-    dominates, and close to best where both images have the same scale.
+    Four-point samples, Gauss-Newton on the error (Hartley, Zisserman 2004, sections 4.2.2 and 4.2.6).
     """
     a, b = paired_points(a, b, 2, 4, "homography")
     rows, to_a, to_b, scale = scaled_pairs(a, b)
     weights, inside = relative_weights(sigma, len(a)), replace(settings, threshold=settings.threshold / scale)
     from_b = np.linalg.inv(to_b)
+    if error not in MODELS:
+        raise ModelError(f"error is one of {', '.join(MODELS)}; got {error!r}")
+    model = MODELS[error]
     if settings.backend == "own":
-        found = search(HOMOGRAPHY, rows, inside, weights, rng)
+        found = search(model, rows, inside, weights, rng)
     else:
         outside = search_outside("homography", a, b, settings, rng)
         start = _facing(to_b @ outside.model @ np.linalg.inv(to_a), rows)
-        found = assess(HOMOGRAPHY, rows, inside, weights, start.ravel(), outside)
+        found = assess(model, rows, inside, weights, start.ravel(), outside)
     sigma2 = found.variance(sigma, scale)
-    cov = sigma2 * _inverse_information(rows, found)
+    cov = sigma2 * _inverse_information(rows, found, error)
     change = np.kron(from_b, to_a.T)
     H, cov = unit_norm(change @ found.model, change @ cov @ change.T)
     return result_of(found, H.reshape(3, 3), cov, scale=scale)
@@ -93,12 +115,15 @@ def _facing(H: Array, rows: Array) -> Array:
     return np.asarray(H * (np.copysign(1.0, np.median(third)) / np.linalg.norm(H)))
 
 
-def _inverse_information(rows: Array, found: Found) -> Array:
-    """The covariance (9, 9) of the homography's elements for errors of unit sigma."""
-    from vision3d.kernels.robust_homography import normal_equations
+def _inverse_information(rows: Array, found: Found, error: str) -> Array:
+    """The covariance (9, 9) of the elements for errors of unit sigma."""
+    if error == "transfer":
+        from vision3d.kernels.robust_homography import normal_equations as equations
+    else:
+        from vision3d.kernels.robust_homography_sampson import sampson_normal_equations as equations
 
     N, g = np.empty((9, 9)), np.empty(9)
-    normal_equations(rows, found.weights, found.model, N, g)
+    equations(rows, found.weights, found.model, N, g)
     return pseudo_inverse(N, found.model[None])
 
 
