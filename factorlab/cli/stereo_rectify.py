@@ -65,7 +65,7 @@ def rectify(sources: tuple[str, ...], **options: Any) -> int:
     from factorlab.stereo.pairing import pair_names, split_sides
     from factorlab.stereo.rectified_document import RectifyJob, rectified_document, rectified_files
     from sequential.errors import DataError
-    from vision3d.images import image_paths, read_image
+    from vision3d.images import image_paths
     from vision3d.stereo import rectify as rectification_of
     from vision3d.stereo.rectify_files import rectify_files
 
@@ -78,8 +78,9 @@ def rectify(sources: tuple[str, ...], **options: Any) -> int:
     if not pairing.pairs:
         raise DataError("no left picture has a right one")
     pairs = [(left[i], right[j]) for i, j in pairing.pairs]
-    first = read_image(pairs[0][0])
-    rig = read_rig_of(options["calibration"], (first.shape[1], first.shape[0]), UNITS[options["unit"]])
+    rig = read_rig_of(
+        options["calibration"], _size_of_first([one for one, _ in pairs]), UNITS[options["unit"]]
+    )
     pair = rectification_of(
         rig, alpha=options["alpha"], size=_size(options["size"]) or rig.left.size, method=options["method"],
         zero_disparity=not options["own_centres"],
@@ -125,6 +126,22 @@ def read_rig_of(path: Path, size: tuple[int, int], unit_m: float) -> StereoRig:
         )
     click.echo(f"{path} is of images of {calibrated} and the pictures have {given}: it is scaled", err=True)
     return rig.resized(size)
+
+
+def _size_of_first(paths: list[Path]) -> tuple[int, int]:
+    """(width, height) of the first picture that can be read."""
+    from sequential.errors import DataError
+    from vision3d.images import read_image
+
+    faults = []
+    for path in paths:
+        try:
+            height, width = read_image(path).shape
+        except DataError as error:
+            faults.append(error)
+        else:
+            return width, height
+    raise faults[0]
 
 
 def _size(text: str | None) -> tuple[int, int] | None:

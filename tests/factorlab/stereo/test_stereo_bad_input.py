@@ -126,3 +126,17 @@ def test_what_rectify_refuses(copies, tmp_path):
 def _written(path, text):
     path.write_text(text)
     return path
+
+
+def test_a_damaged_picture_costs_its_rectified_pair_alone(copies, tmp_path):
+    (tmp_path / "left01.png").write_bytes(b"no picture")
+    cv2.imwrite(str(tmp_path / "right03.png"), np.zeros((1, 1), np.uint8))
+    rig = write_rig(tmp_path / "rig.json", TRUTH)
+    done = rectify(*copies, "--calib", rig, "-o", tmp_path / "out", "--json")
+    assert [one["name"] for one in answer(done)["pairs"]] == ["left02.png", "left04.png"]
+    assert "left01.png" in done.stderr
+    assert "the right image is 1x1 px" in done.stderr
+    (tmp_path / "left02.png").write_bytes(b"")
+    (tmp_path / "left04.png").unlink()
+    (tmp_path / "left03.png").write_bytes(b"")
+    refused("cannot be read as a picture", rectify(*copies, "--calib", rig, "-o", tmp_path / "other"))
