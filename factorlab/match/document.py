@@ -14,12 +14,17 @@ from factorlab.report.document import Cell, Document, Section, Table
 
 if TYPE_CHECKING:
     from factorlab.match.fitting import Geometry
+    from vision3d.two_view import TwoView
 
 __all__ = ["match_document"]
 
 LINES_READ = (
     "Green: matches that agree. Orange: those that do not. Yellow: the border of the first picture in the "
     "second, where a homography carries it."
+)
+CURVES_READ = (
+    "A few of the matches that agree, each in its colour, and the curve on which the motion puts it in the "
+    "other picture: from the epipole (a cross, where it is in view) to infinitely far."
 )
 ERRORS_READ = (
     "Left: distances from the model. Right: arrows from where the model has a point to where it was seen."
@@ -82,9 +87,22 @@ def _sections(done: Matched) -> list[Section]:
     elif geometry.kind == "fundamental":
         sections.append(_matrix("Fundamental matrix", geometry.matrix, EPIPOLAR_MATRIX))
     elif geometry.two_view is not None and np.isfinite(geometry.two_view.b_T_a).all():
-        sections.append(_motion(geometry))
+        sections += [_epipolar(done, geometry.two_view), _motion(geometry)]
     sections.append(_times(done))
     return sections
+
+
+def _epipolar(done: Matched, view: TwoView) -> Section:
+    from factorlab.report.epipolar_pictures import epipolar_curves
+
+    def drawn_curves() -> Any:
+        if done.a.camera is None or done.b.camera is None:
+            return None
+        return epipolar_curves(
+            (done.a.image, done.b.image), (done.a.camera, done.b.camera), (done.pixels_a, done.pixels_b), view
+        )
+
+    return Section("Epipolar curves", figure=drawn_curves, caption=CURVES_READ)
 
 
 def _homography(geometry: Geometry) -> Section:

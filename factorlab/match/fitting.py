@@ -102,9 +102,9 @@ def fit_essential_pair(
         *cameras, a, b, sigma_px=sigma, threshold_px=None if sigma is not None else settings.threshold_px / 2,
         rng=rng,
     )  # fmt: skip
-    errors = np.abs(view.residuals) * (1.0 if sigma is None else float(np.median(sigma)))
     return Geometry(
-        "essential", view.essential, None, view.inliers, errors, view.sigma_px, view.trials, view.stopped,
+        "essential", view.essential, None, view.inliers, view.residuals, view.sigma_px, view.trials,
+        view.stopped,
         "own", view.log10_nfa, view,
     )  # fmt: skip
 

@@ -3,6 +3,7 @@
 view = estimate_two_view(camera_a, camera_b, pixels_a, pixels_b)
 """
 
+from vision3d.two_view.epipolar import epipolar_curve, epipolar_lines, fundamental_matrix, sampson_px
 from vision3d.two_view.estimate import estimate_two_view
 from vision3d.two_view.motion import (
     decompose_essential,
@@ -13,15 +14,22 @@ from vision3d.two_view.motion import (
 )
 from vision3d.two_view.planes import decompose_homography, plane_homography
 from vision3d.two_view.result import TwoView
+from vision3d.two_view.uncalibrated import cameras_from_fundamental, projective_cameras
 
 __all__ = [
     "TwoView",
+    "cameras_from_fundamental",
     "decompose_essential",
     "decompose_homography",
+    "epipolar_curve",
+    "epipolar_lines",
     "essential_matrix",
     "estimate_two_view",
+    "fundamental_matrix",
     "local_motion",
     "plane_homography",
+    "projective_cameras",
     "recover_pose",
     "retract_motion",
+    "sampson_px",
 ]

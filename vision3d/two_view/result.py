@@ -31,8 +31,9 @@ class TwoView:
     points_a : (N, 3) in a's frame, in baselines; NaN where not triangulated
     verdict : "general", "planar", "pure rotation", "identical", "no overlap" or "too few"
     words : what that means and what to do
-    sigma_px : noise of a coordinate of a pixel: as given, or from the residuals
-    residuals : (N,) signed Sampson distances to b_T_a, px where the sigma was estimated, else sigmas
+    sigma_px : noise of a coordinate of a pixel: the median of those given, or from the residuals
+    residuals : (N,) Sampson distances to what the verdict says, px (of a match of median sigma, where each
+        has its own); NaN without a ray
     rivals : other motions (M, 7) that explain the pairs as well: the second reading of a plane
     normal : (3,) of the plane in a's frame over its distance in baselines, NaN unless planar
     parallax_rad : median angle between the rays of inliers once the rotation is undone
