@@ -32,10 +32,10 @@ def on_an_arc(views, radius=5.0, spread_rad=1.0):
     return np.array([looking_at(place) for place in places])
 
 
-def seen_cloud(rng, views=6, count=120, sigma_px=0.0, camera=CAMERA, poses=None):
+def seen_cloud(rng, views=6, count=120, sigma_px=0.0, camera=CAMERA, poses=None, reach=1.2):
     """A reconstruction that is the truth, whose pixels carry noise; every picture sees most points."""
     poses = on_an_arc(views) if poses is None else poses
-    points = rng.uniform(-1.2, 1.2, (count, 3))
+    points = rng.uniform(-reach, reach, (count, 3))
     rows = []
     for view, pose in enumerate(poses):
         pixels = camera.project(transform(pose, points))

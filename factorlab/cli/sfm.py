@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["sfm"]
 
-LENSES = ("pinhole", "brown1", "brown2", "brown4", "fisheye4")
+LENSES = ("auto", "pinhole", "brown1", "brown2", "brown4", "fisheye4")
 OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.argument("sources", metavar="IMAGES…", nargs=-1, required=True),
     click.option("--camera", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
@@ -28,8 +28,8 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.option("--global", "whole", is_flag=True, help="Solve for all pictures at once (GLOMAP)."),
     click.option("--mapper", type=click.Choice(("incremental", "global", "own")), metavar="NAME",
                  help="COLMAP's incremental or global one, or our own.  [default: incremental]"),
-    click.option("--lens", type=click.Choice(LENSES), default="brown1", show_default=True,
-                 help="Lens model to calibrate where no --camera is given."),
+    click.option("--lens", type=click.Choice(LENSES), default="auto", show_default=True,
+                 help="To calibrate without --camera; auto: brown1, or brown2 where residuals ask for it."),
     click.option("--sharing", type=click.Choice(("auto", "one", "each")), default="auto", show_default=True,
                  help="Pictures of one camera: same size, device and zoom; same size; none."),
     click.option("--max-size", type=click.IntRange(64), default=1600, show_default=True, metavar="PX",

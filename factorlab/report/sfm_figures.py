@@ -105,13 +105,9 @@ def errors(found: Reconstruction) -> Figure | None:
     grid = np.linspace(0.0, most, 50)
     counted = np.clip(lengths, 0.0, most)
     bars.hist(counted, bins=grid, density=True, color="#9cc3dd", label="residuals")
-    middle, sigma = 0.5 * (grid[1:] + grid[:-1]), found.sigma_px
-    bars.plot(
-        middle,
-        middle / sigma**2 * np.exp(-0.5 * (middle / sigma) ** 2),
-        color="black",
-        label=f"normal, σ {sigma:.2f} px",
-    )
+    middle, sigma = 0.5 * (grid[1:] + grid[:-1]), found.rms_px / np.sqrt(2.0)
+    normal = middle / sigma**2 * np.exp(-0.5 * (middle / sigma) ** 2)
+    bars.plot(middle, normal, color="black", label="normal, of the same RMS")
     bars.axvline(found.rms_px, color=RED, linestyle="--", linewidth=1.0, label=f"RMS {found.rms_px:.2f} px")
     bars.set(xlabel="length of the residual, px", ylabel="density", yticks=[], xlim=(0.0, most))
     _field(field, found, residuals, finite)

@@ -20,7 +20,7 @@ SPACE_READ = (
     "is away from what lies below in most pictures."
 )
 ERRORS_READ = (
-    "Left: lengths of the residuals, and what normal noise of the σ found would give. Right: means over "
+    "Left: lengths of the residuals, and what normal noise of the same RMS would give. Right: means over "
     "cells of the image; arrows that turn together say that the lens model does not follow."
 )
 TRACKS_READ = "How many pictures see a point, and the largest angle between two of its rays."

@@ -17,6 +17,7 @@ from vision3d.sfm.colmap import from_pycolmap
 from vision3d.sfm.database import camera_for, fill_database
 from vision3d.sfm.explaining import NoModelError, why_missing, why_no_model
 from vision3d.sfm.extraction import PictureFeatures, extract_all
+from vision3d.sfm.lens_choice import with_second_coefficient
 from vision3d.sfm.mapping import map_pictures
 from vision3d.sfm.matching import match_all
 from vision3d.sfm.pair_geometry import view_graph_of
@@ -24,7 +25,7 @@ from vision3d.sfm.patience import Patience
 from vision3d.sfm.pictures import PhotoSources, photo_sources
 from vision3d.sfm.reconstruction import Reconstruction
 from vision3d.sfm.settings import SfmSettings
-from vision3d.sfm.settling import settled
+from vision3d.sfm.settling import settled, soft_scale
 
 if TYPE_CHECKING:
     import pycolmap
@@ -147,7 +148,11 @@ def _told(
     found = from_pycolmap(models[0], lenses=known)
     found = found.replaced(names=tuple(pictures[int(name)].name for name in found.names))
     colors = _colours(found, models[0], pictures)
-    return settled(found.replaced(missing=tuple(missing), graph=graph, colors=colors), settings)
+    found = settled(found.replaced(missing=tuple(missing), graph=graph, colors=colors), settings)
+    if settings.camera is None and settings.lens == "auto":
+        larger = with_second_coefficient(found, soft_scale(found))
+        found = found if larger is None else settled(larger, settings)
+    return found
 
 
 def _colours(

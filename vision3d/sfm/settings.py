@@ -11,13 +11,14 @@ __all__ = ["LENS_MODELS", "MAPPERS", "SfmSettings"]
 
 MAPPERS = ("incremental", "global", "own")
 LENS_MODELS = {
+    "auto": "SIMPLE_RADIAL",
     "pinhole": "SIMPLE_PINHOLE",
     "brown1": "SIMPLE_RADIAL",
     "brown2": "RADIAL",
     "brown4": "OPENCV",
     "fisheye4": "OPENCV_FISHEYE",
 }
-"""By the lens to calibrate: COLMAP's model, with one focal length where it has such a one."""
+"""By the lens to calibrate: COLMAP's model to map with, with one focal length where it has such a one."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class SfmSettings:
     Parameters
     ----------
     camera : known intrinsics, which are kept; None: every camera is calibrated from the pictures
-    lens : of a camera that is calibrated: one of `LENS_MODELS`
+    lens : of a camera that is calibrated: one of `LENS_MODELS`; "auto" begins with one radial coefficient and
+        takes a second one where the residuals ask for it
     sharing : which pictures have one camera: "auto" goes by size and by what EXIF says of camera and zoom,
         "one" by size only, "each" gives every picture its own
     mapper : "incremental" grows from two views, "global" solves for all at once; "own" grows
@@ -44,7 +46,7 @@ class SfmSettings:
     """
 
     camera: Camera | None = None
-    lens: str = "brown1"
+    lens: str = "auto"
     sharing: str = "auto"
     mapper: str = "incremental"
     max_size: int = 1600
