@@ -48,12 +48,12 @@ def depth_document(run: DepthRun, command: str = "") -> Document:
         f"focal length {run.geometry.focal_px:.0f} px, baseline {1e3 * run.geometry.baseline_m:.1f} mm"
     )  # fmt: skip
     lead = (
-        f"{run.pair.source or run.pair.left_name}: two pictures of {width} by {height} px; {known}. "
+        f"{run.pair.source or run.pair.left_name}: two pictures of {width} by {height} px; {known}; "
         f"{MATCHERS[run.disparity.matcher]}, {least} to {most} px."
     )
     return Document(
         title="Depth from two pictures",
-        lead=lead[0].upper() + lead[1:],
+        lead=lead,
         verdicts=tuple(depth_verdicts(run)),
         sections=tuple(_sections(run)),
         numbers=depth_numbers(run),

@@ -128,7 +128,7 @@ def demo_pair(seed: int = 0) -> StereoPair:
     a, b = (np.ascontiguousarray(one[..., ::-1], dtype=np.uint8) for one in (left, right))
     return StereoPair(
         "motorcycle_left", "motorcycle_right", a, b, motorcycle_rig((a.shape[1], a.shape[0])), told,
-        "scikit-image's copy of the motorcycle (Middlebury 2014, a quarter of its size)",
+        "Scikit-image's copy of the motorcycle (Middlebury 2014, a quarter of its size)",
     )  # fmt: skip
 
 
@@ -145,7 +145,7 @@ def rendered_pair(rng: np.random.Generator, size: tuple[int, int] = (640, 480)) 
     view = render_stereo(camera, camera, shift, desk(rng), rng=rng, colour=True)
     return StereoPair(
         "left", "right", view.left.image, view.right.image, StereoRig(camera, camera, shift),
-        view.disparity.astype(np.float32), "a rendered desk",
+        view.disparity.astype(np.float32), "A rendered desk",
     )  # fmt: skip
 
 

@@ -15,13 +15,13 @@ _U64_2 = types.Array(uint64, 2, "C", readonly=True)
 _F32_1 = types.Array(float32, 1, "C", readonly=True)
 
 
-@kernel(void(_U8_2, int64, int64, uint64[:, ::1]))
-def census(image, half_w, half_h, out):
-    """Which neighbours of each pixel are darker: one bit each, at most 64 (Zabih and Woodfill 1994)."""
+@kernel(void(_U8_2, int64, int64, int64, uint64[:, ::1]))
+def census(image, half_w, half_h, least, out):
+    """Which neighbours of each pixel are darker by `least` levels: a bit each (Zabih and Woodfill 1994)."""
     height, width = image.shape
     for y in range(height):
         for x in range(width):
-            centre = image[y, x]
+            centre = np.int64(image[y, x]) - least
             word = np.uint64(0)
             for dy in range(-half_h, half_h + 1):
                 yy = min(max(y + dy, 0), height - 1)
@@ -30,7 +30,7 @@ def census(image, half_w, half_h, out):
                         continue
                     xx = min(max(x + dx, 0), width - 1)
                     word = word << np.uint64(1)
-                    if image[yy, xx] < centre:
+                    if np.int64(image[yy, xx]) <= centre:
                         word |= np.uint64(1)
             out[y, x] = word
 

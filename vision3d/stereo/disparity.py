@@ -49,8 +49,8 @@ class StereoSettings:
     least_px: int | None = None
     most_px: int | None = None
     paths: Literal[4, 8] = 8
-    small_step: float = 30.0
-    large_step: float = 200.0
+    small_step: float = 45.0
+    large_step: float = 300.0
     edge_levels: float = 20.0
     left_right_px: float = 1.0
     speckle_px: int = 100

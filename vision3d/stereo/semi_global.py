@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["RawDisparity", "grey_of", "semi_global"]
 
 HALF_WINDOW = (4, 3)  # of the census: 9 by 7 pixels, 62 bits
+LEAST = 2  # levels that a neighbour must be darker by, to be told from noise
 BITS_COST, BITS_SCALE = 127.0, 30.0
 LEVELS_COST, LEVELS_SCALE = 60.0, 10.0
 OUTSIDE = 60  # what a match outside the right picture costs: as much as a poor one
@@ -71,8 +72,8 @@ def _strip(a: Any, b: Any, first: int, n: int, how: StereoSettings) -> tuple[Any
 
     grey_a, grey_b = grey_of(a), grey_of(b)
     words = [np.empty(grey_a.shape, np.uint64) for _ in range(2)]
-    census(grey_a, *HALF_WINDOW, words[0])
-    census(grey_b, *HALF_WINDOW, words[1])
+    census(grey_a, *HALF_WINDOW, LEAST, words[0])
+    census(grey_b, *HALF_WINDOW, LEAST, words[1])
     channels = a.shape[2]
     of_bits = BITS_COST * (1.0 - np.exp(-np.arange(65) / BITS_SCALE))
     of_levels = LEVELS_COST * (1.0 - np.exp(-np.arange(256 * channels) / (channels * LEVELS_SCALE)))
