@@ -2,7 +2,7 @@
 
 The sets are those of the reference: 1000 matches in 640 px, 0.7 px of noise, outliers anywhere, threshold
 3 px, at most 10 000 samples.  Errors are means over sets drawn anew, in permuted order; "oracle" is least
-squares on the true inliers, which no method can be expected to beat.  Times are medians, taken in turn.
+squares on the true inliers, which no method can be expected to beat.  Times are medians of CPU time, in turn.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 from robust_worlds import corner_error_px, fundamental_matches, matches, off_lines_px
 
-from measure.figures import Figure, interleaved, say
+from measure.figures import Figure, say
+from measure.timing import cpu_seconds
 from vision3d.robust import RansacSettings, fit_fundamental, fit_homography, fit_line, fit_similarity
 
 __all__ = ["figures"]
@@ -37,7 +38,7 @@ def figures(*, quick: bool = False) -> dict[str, Figure]:
     for share in LEVELS:
         say(f"homography, {share:.0%} inliers")
         rows |= accuracy(share, 10 if quick else 60)
-        rows |= duration(share, 3 if quick else 15)
+        rows |= duration(share, 3 if quick else 9)
     say("other models")
     return (
         rows | fundamental(6 if quick else 30) | similarity(10 if quick else 60) | line(10 if quick else 60)
@@ -71,13 +72,13 @@ def accuracy(share: float, sets: int) -> dict[str, Figure]:
 
 
 def duration(share: float, rounds: int) -> dict[str, Figure]:
-    """Time of one fit with its covariance, ours over a bare call of OpenCV's RANSAC."""
+    """CPU time of one fit with its covariance, ours over a bare call of OpenCV's RANSAC."""
     a, b, _ = matches(np.random.default_rng(1), share)
 
     def opencv(method: int) -> Callable[[], object]:
         return lambda: cv2.findHomography(a, b, method, 3.0, maxIters=10_000, confidence=0.999)
 
-    times = interleaved(
+    times = cpu_seconds(
         {
             "own": lambda: fit_homography(a, b, OWN),
             "cv2.RANSAC": opencv(cv2.RANSAC),
