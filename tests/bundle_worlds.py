@@ -6,6 +6,7 @@ from sequential.manifold import SE3
 from vision3d.camera import Camera
 from vision3d.rigid import inverse, transform
 from vision3d.sfm import Reconstruction
+from vision3d.sfm.growth import Scene
 
 SIZE = (640, 480)
 CAMERAS = {
@@ -85,3 +86,23 @@ def disturbed(truth, rng, *, share=1.0, focal=0.02):
         cameras_T_world=inverse(SE3().retract(inverse(truth.cameras_T_world), steps)),
         points=truth.points + share * 0.01 * depth * rng.standard_normal(truth.points.shape),
     )
+
+
+def seen_from(world, rng, *, wrong=0.0, calibrate=False):
+    """What a matcher would give: features of every image in any order, and matches, some of them wrong."""
+    views = len(world.names)
+    order = [rng.permutation(np.flatnonzero(world.image_index == i)) for i in range(views)]
+    scene = Scene(
+        world.names, world.cameras, world.camera_of, tuple(world.pixels[rows] for rows in order),
+        tuple(np.tile(np.uint8([200, 100, i]), (len(rows), 1)) for i, rows in enumerate(order)), calibrate,
+    )  # fmt: skip
+    matches = {}
+    for a in range(views):
+        for b in range(a + 1, views):
+            of_a, of_b = world.point_index[order[a]], world.point_index[order[b]]
+            _, rows_a, rows_b = np.intersect1d(of_a, of_b, return_indices=True)
+            lost = rng.random(len(rows_b)) < wrong
+            rows_b[lost] = rng.permutation(rows_b[lost])
+            if len(rows_a):
+                matches[a, b] = np.c_[rows_a, rows_b]
+    return scene, matches

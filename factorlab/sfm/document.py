@@ -50,9 +50,10 @@ def _lead(done: SfmDone) -> str:
     camera = "a known camera" if settings.camera is not None else "cameras that the pictures calibrate"
     if settings.camera is None and len(found.cameras) == 1:
         camera = "one camera that the pictures calibrate"
+    mapper = "our own mapper" if settings.mapper == "own" else f"{settings.mapper} mapper of COLMAP"
     return (
         f"{len(found)} of {done.given} pictures have their place among {len(found.points)} points, with "
-        f"{camera}; {settings.mapper} mapper of COLMAP, {done.seconds:.0f} s."
+        f"{camera}; {mapper}, {done.seconds:.0f} s."
     )
 
 

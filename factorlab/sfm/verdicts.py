@@ -225,6 +225,6 @@ def _adjustment(done: SfmDone) -> list[Verdict]:
         return [Verdict("our adjustment", None, None, "WARN", why, "no covariances are given")] if why else []
     change = result.cost / result.initial_cost - 1.0
     status: Status = "PASS" if abs(change) <= GOOD_AGREEMENT else "WARN"
-    meaning = f"change of COLMAP's cost by our bundle adjustment, {result.iterations} steps ({result.route})"
+    meaning = f"change of the mapper's cost by our own, {result.iterations} steps ({result.route})"
     action = "" if status == "PASS" else "the two disagree about the minimum; see the residuals"
     return [Verdict("our adjustment", 100.0 * change, None, status, meaning, action, "%")]

@@ -105,11 +105,12 @@ def _scene(
 def _settled(found: Reconstruction, *, refine: bool) -> Reconstruction:
     """The last adjustment: gross errors leave, and the loss doubts from three standard deviations on."""
     sigma_px = max(noise_of(found), LEAST_PX)
-    for _ in range(2):
+    for last in (False, False, True):
         problem, start = bundle_problem(found, refine=refine)
         solved = adjust(problem, start, loss="soft_l1", loss_px=SOFT * sigma_px)
         found = resettled(found, problem, solved.state)
-        found = found.selected(found.errors_px() <= GROSS * sigma_px)
+        if not last:
+            found = found.selected(found.errors_px() <= GROSS * sigma_px)
     return found.replaced(sigma_px=noise_of(found))
 
 

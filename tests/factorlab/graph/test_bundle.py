@@ -3,7 +3,7 @@
 import gtsam
 import numpy as np
 import pytest
-from bundle_worlds import CAMERAS, bundle_world, disturbed
+from bundle_worlds import CAMERAS, bundle_world, disturbed, seen_from
 from gtsam.symbol_shorthand import K, L, X
 
 from factorlab.graph.bundle import bundle_adjust
@@ -13,7 +13,9 @@ from vision3d.sfm import Reconstruction
 from vision3d.sfm.bal import read_bal
 from vision3d.sfm.bundle_problem import bundle_problem
 from vision3d.sfm.bundler import read_bundler
+from vision3d.sfm.growing import grow
 from vision3d.sfm.losses import LOSSES, loss_of
+from vision3d.sfm.seeding import verified_pairs
 
 NATIVE = [
     ("pinhole", False), ("pinhole", True), ("pinhole", ("fx", "fy", "cx", "cy")),
@@ -188,3 +190,20 @@ def test_balbianello_ends_where_colmap_ends(loss, cost, data_dir):
     # COLMAP 4.2.1's final cost from this file, one camera for every image
     assert found.cost == pytest.approx(cost, rel=1e-6)
     assert (np.linalg.eigvalsh(found.point_covs) > 0.0).all()
+
+
+def test_our_mapper_grows_on_gtsam(rng):
+    world = bundle_world(rng, views=4, points=80, sigma_px=0.3)
+    scene, matches = seen_from(world, rng, calibrate=True)
+    routes = []
+
+    def by_gtsam(model, refine):
+        result = bundle_adjust(model, refine_intrinsics=refine, loss="huber", covariances=False)
+        routes.append(result.route)
+        return result.reconstruction
+
+    found = grow(scene, verified_pairs(scene, matches), adjust=by_gtsam)
+    assert found.names == world.names
+    assert set(routes) == {"native"}
+    assert found.rms_px < 0.6
+    assert found.cameras[0].intrinsics[0] == pytest.approx(520.0, rel=0.02)

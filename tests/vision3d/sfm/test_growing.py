@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bundle_worlds import bundle_world
+from bundle_worlds import bundle_world, seen_from
 
 from sequential.errors import ShapeError
 from vision3d.camera import Camera
@@ -17,26 +17,6 @@ from vision3d.sfm.growing import grow
 from vision3d.sfm.growth import GrowthSettings, Scene
 from vision3d.sfm.matched import match_images
 from vision3d.sfm.seeding import seeds, verified_pairs
-
-
-def seen_from(world, rng, *, wrong=0.0, calibrate=False):
-    """What a matcher would give: features of every image in any order, and matches, some of them wrong."""
-    views = len(world.names)
-    order = [rng.permutation(np.flatnonzero(world.image_index == i)) for i in range(views)]
-    scene = Scene(
-        world.names, world.cameras, world.camera_of, tuple(world.pixels[rows] for rows in order),
-        tuple(np.tile(np.uint8([200, 100, i]), (len(rows), 1)) for i, rows in enumerate(order)), calibrate,
-    )  # fmt: skip
-    matches = {}
-    for a in range(views):
-        for b in range(a + 1, views):
-            of_a, of_b = world.point_index[order[a]], world.point_index[order[b]]
-            _, rows_a, rows_b = np.intersect1d(of_a, of_b, return_indices=True)
-            lost = rng.random(len(rows_b)) < wrong
-            rows_b[lost] = rng.permutation(rows_b[lost])
-            if len(rows_a):
-                matches[a, b] = np.c_[rows_a, rows_b]
-    return scene, matches
 
 
 def apart(found, world):
