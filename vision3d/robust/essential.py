@@ -75,9 +75,8 @@ def fit_essential_rows(
     else:
         outside = _outside(rows, settings, rng)
         found = assess(ESSENTIAL, rows, settings, weights, outside.model.ravel(), outside)
-    level2 = found.sigma2 if sigma is None else float(np.median(sigma)) ** 2
     E = found.model.reshape(3, 3)
-    cov = level2 * _inverse_information(rows, found)
+    cov = found.variance(sigma) * _inverse_information(rows, found)
     return result_of(found, E * (np.sqrt(2.0) / np.linalg.norm(E)), cov)
 
 

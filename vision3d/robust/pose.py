@@ -115,7 +115,7 @@ def _finished(
     cost, _ = refine_pose(
         camera.code, camera.parameters, points[agree], pixels[agree], weights, np.inf, pose, information
     )
-    sigma2 = found.sigma2 if level is None else level**2
+    sigma2 = found.variance(level)
     if not np.isfinite(cost):
         return found.model, np.full((6, 6), np.nan)
     pose[:4] *= np.where(pose[0] < 0.0, -1.0, 1.0)
