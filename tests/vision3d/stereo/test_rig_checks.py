@@ -12,6 +12,8 @@ from sequential.manifold import SE3
 from vision3d.camera import Camera
 from vision3d.rigid import compose, transform
 from vision3d.stereo import StereoRig, rectify
+from vision3d.stereo.calibration_error import with_calibration_error
+from vision3d.stereo.depth import depth_of
 from vision3d.stereo.deviations import deviations
 from vision3d.stereo.fit import calibrate_stereo
 from vision3d.stereo.held_out import leave_pairs_out
@@ -167,3 +169,16 @@ def test_lenses_are_chosen_by_the_rows_of_left_out_pairs(rng):
     assert held.row_px < leave_pairs_out(calibrate_stereo(pairs, ("brown5", "brown2"))).row_px
     same, _ = calibrate_with_best_lenses(pairs[:3], ("brown2", "brown2"))
     assert same.rig.right.lens == "brown2"
+
+
+def test_depth_is_as_sure_as_by_differences(rng):
+    """About the axis equal to the map that moves the rig and looks how far the rays' midpoints go.
+
+    Off it rays that pass each other by a row pull the midpoint, and not the disparity.
+    """
+    pair = rectify(calibrate_stereo(WORLD.pairs(rng)).rig)
+    flat = np.full(pair.size[::-1], pair.focal_px * pair.baseline_m / 0.8)
+    moved = with_calibration_error(depth_of(flat, pair.focal_px, pair.baseline_m), pair).systematic_m
+    at = np.array([[213.0, 239.5], [319.5, 239.5], [426.0, 239.5], [319.5, 160.0]])  # nodes of the map
+    x, y = at.round().astype(int).T
+    np.testing.assert_allclose(rig_uncertainty(pair, at, 0.8).depth_std_m, moved[y, x], rtol=0.05)
