@@ -22,9 +22,9 @@ JUMP, NEAR_PX = 0.04, 10  # depths of neighbours that differ by this share; how 
 class Measured:
     """Points of one pair.
 
-    nees : (n,) normalised estimation error squared over 3, of points that passed the gates
+    nees : (n,) normalised estimation error squared over 3, as declared, of points that passed the gates
     edge : (n,) whether a jump of depth is within `NEAR_PX` of the feature
-    factor : of the noise, as the residuals tell it
+    factor : of the variance of the noise, as the residuals across the epipolar lines tell it
     found : everything that was triangulated
     """
 
@@ -55,11 +55,10 @@ def measured_pair(name: str, rng: np.random.Generator, kind: str = "sift", **set
     pixels, there, half = pixels[ok], there[ok], 0.5 * cov[ok]
     found = triangulate(CAMERA, poses, np.stack([pixels, there]), sigma_px=np.stack([half, half]))
     factor = variance_factor(found.chi2[found.ok], found.dof[found.ok])
-    sized = found.scaled(factor)
     truth, _ = surface_points(CAMERA, poses[0], scene, pixels)
-    kept = sized.ok & (sized.chi2 < GATE) & np.isfinite(truth).all(axis=1)
-    error = (sized.points - truth)[kept]
-    nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(sized.covs[kept]), error) / 3
+    kept = found.ok & (found.chi2 < GATE) & np.isfinite(truth).all(axis=1)
+    error = (found.points - truth)[kept]
+    nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(found.covs[kept]), error) / 3
     return Measured(nees, near_edges(a.depth, pixels[kept]), factor, found)
 
 
