@@ -41,7 +41,6 @@ from vision3d.render import (
 from vision3d.rigid import transform
 from vision3d.robust import fit_homography
 from vision3d.triangulate import triangulate
-from vision3d.variance_factor import variance_factor
 
 VRAIE = Camera("brown5", (532.8, 533.1, 332.5, 238.9), (-0.28, 0.09, 0.0008, -0.0006, -0.02), (640, 480))
 ICI = np.array([1.0, 0, 0, 0, 0, 0, 0])
@@ -102,7 +101,6 @@ def deux_vues(camera, vues, poses, scene):
     la, cov, ok = refine_matches(vues[0].image, vues[1].image, ici, la, warps=paires.warps(a, b), radius_px=5)
     pixels, moitie = np.stack([ici[ok], la[ok]]), 0.5 * np.stack([cov[ok], cov[ok]])
     points = triangulate(camera, poses, pixels, sigma_px=moitie)
-    points = points.scaled(variance_factor(points.chi2[points.ok], points.dof[points.ok]))
     vrais, _ = surface_points(VRAIE, poses[0], scene, ici[ok])
     bons = points.ok & (points.chi2 < 6.63) & np.isfinite(vrais).all(axis=1)
     return ici[ok][bons], points.points[bons, 2], vrais[bons, 2], np.sqrt(points.covs[bons, 2, 2])
