@@ -82,7 +82,7 @@ def gric(squared: Array, model: str, sigma: float = 1.0) -> float:
     """
     dim, parameters = GRIC_MODELS[model]
     misfit = np.minimum(squared / sigma**2, 2.0 * (PAIR_DIM - dim)).sum()
-    n = len(squared)
+    n = max(len(squared), 1)
     return float(misfit + dim * n * np.log(PAIR_DIM) + parameters * np.log(PAIR_DIM * n))
 
 

@@ -28,6 +28,7 @@ from vision3d.two_view.result import Verdict
 
 __all__ = ["Told", "tell_motion", "tell_plane", "tell_turn"]
 
+FLAT = 0.8
 SURER = 5.0
 """How many pairs more must speak for one reading of a plane to rule out the other: some do by chance."""
 ROUNDS = 3
@@ -91,8 +92,7 @@ def tell_plane(readings: Readings, level: float | None) -> Told:
     for one in readings.planes:
         refined = refine_plane(rows[agree], one.R, one.t, one.normal, loss="cauchy", scale=noise.cauchy)
         # what does not lie on the plane speaks for one reading
-        off = sampson_distances(rows, _motion_of(refined))
-        found.append((float(np.minimum(off / readings.threshold**2, 1.0).sum()), refined))
+        found.append((_misfit(readings, _motion_of(refined)), refined))
     found.sort(key=lambda pair: pair[0])
     best = found[0][1]
     p = best.parameters
@@ -145,13 +145,28 @@ def tell(readings: Readings, level: float | None) -> Told:
     """The story that Torr's criterion prefers, or the nearest that the pairs allow."""
     best = readings.criterion.best
     try:
-        if best == "planar" and readings.planes:
+        if readings.planes and (best == "planar" or (best == "general" and _open(readings))):
             return tell_plane(readings, level)
         if best != "pure rotation":
             return tell_motion(readings, level)
     except (DataError, UnderConstrainedError):
         pass  # nothing in front of both cameras, or a direction free: what is left is a turn
     return tell_turn(readings, level)
+
+
+def _open(readings: Readings) -> bool:
+    """Whether a plane holds most pairs, and the others do not say which of its readings is right."""
+    limit = readings.threshold**2
+    flat = readings.homography_squared[readings.motion_squared < limit] < 2.0 * limit
+    if len(readings.planes) < 2 or not np.mean(flat) > FLAT:
+        return False
+    best = _misfit(readings, readings.motion)
+    return all(_misfit(readings, motion(one.R, one.t)) < best + SURER for one in readings.planes)
+
+
+def _misfit(readings: Readings, b_T_a: Array) -> float:
+    """How many pairs do not agree with a motion, those that nearly do not by their share."""
+    return float(np.minimum(sampson_distances(readings.rows, b_T_a) / readings.threshold**2, 1.0).sum())
 
 
 def _motion_of(refined: Refined) -> Array:

@@ -1,10 +1,13 @@
 """The motion between two pictures: truth, honesty, and a verdict for what has none."""
 
+import cv2
 import numpy as np
 import pytest
 from two_view_worlds import PINHOLE, distorted, world
 
 from sequential.errors import NotFiniteError, ShapeError
+from vision3d.camera import Camera
+from vision3d.features import detect_features, match_features
 from vision3d.two_view import estimate_two_view, local_motion
 
 
@@ -62,3 +65,49 @@ def test_same_seed_same_motion(rng):
     it = world(rng, wrong=0.3)
     first, second = (estimated(it, rng=np.random.default_rng(4)) for _ in range(2))
     np.testing.assert_array_equal(first.b_T_a, second.b_T_a)
+
+
+@pytest.mark.parametrize(
+    ("shape", "verdict"), [("space", "general"), ("plane", "planar"), ("turn", "pure rotation")]
+)
+def test_nine_wrong_matches_in_ten_are_no_excuse(rng, shape, verdict):
+    it = world(rng, shape=shape, wrong=0.9, count=600, baseline=0.4)
+    # sorted as matches are: surer ones first, but not surely right
+    order = np.argsort(rng.random(600) + 0.6 * ~it.right)
+    view = estimate_two_view(it.camera, it.camera, it.pixels_a[order], it.pixels_b[order], best_first=True)
+    assert view.verdict == verdict
+    assert view.inliers[it.right[order]].mean() > 0.9
+
+
+@pytest.mark.slow
+def test_both_readings_of_a_plane_are_kept_unless_something_tells(seeds):
+    for seed in seeds:
+        it = world(np.random.default_rng(1000 + seed), shape="plane", wrong=0.2, baseline=0.4, sigma_px=0.2)
+        view = estimated(it)
+        readings = [view.b_T_a, *view.rivals]
+        assert min(np.linalg.norm(local_motion(one, it.b_T_a)) for one in readings) < np.radians(3.0)
+
+
+@pytest.mark.slow
+def test_chance_is_called_chance(seeds):
+    verdicts = {estimated(world(np.random.default_rng(seed), wrong=1.0)).verdict for seed in seeds}
+    assert verdicts == {"no overlap"}
+
+
+def test_real_pairs_of_a_rig(data_dir):
+    folder = data_dir / "vision" / "opencv"
+    left = Camera("brown5", (532.9, 533.0, 342.4, 233.9), (-0.281, 0.026, 0.0012, -0.0001, 0.162), (640, 480))
+    right = Camera("brown5", (536.0, 535.7, 326.9, 250.1), (-0.289, 0.106, 0.0, 0.0, -0.043), (640, 480))
+    for name in ("01", "06"):
+        found = [
+            detect_features(cv2.imread(str(folder / f"{side}{name}.jpg"), 0), "sift")
+            for side in ("left", "right")
+        ]
+        matched = match_features(*found, ratio=0.75).pairs
+        view = estimate_two_view(
+            left, right, found[0].pixels[matched[:, 0]], found[1].pixels[matched[:, 1]], best_first=True
+        )
+        assert view.verdict == "general"
+        assert abs(view.b_T_a[4]) > 0.999
+        assert np.degrees(2.0 * np.arccos(view.b_T_a[0])) < 1.5
+        assert view.sigma_px < 0.4
