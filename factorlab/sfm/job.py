@@ -56,8 +56,8 @@ class SfmDone:
     graph : which pictures were matched with which
     seconds : the whole took
     stopped : it was ended early
-    adjusted : our bundle adjustment of COLMAP's model, with covariances; its model is `found`
-    unadjusted : why there is none
+    adjusted : our bundle adjustment of the model, with covariances; where it converged, `found` is its model
+    unadjusted : why there is none, or what is wrong with it
     """
 
     sources: tuple[str, ...]
@@ -136,13 +136,22 @@ def _adjusted(found: Reconstruction, job: SfmJob) -> tuple[Reconstruction, Bundl
 
     if len(found.pixels) > MOST_OBSERVATIONS:
         return found, None, f"{len(found.pixels)} observations are more than {MOST_OBSERVATIONS}"
-    try:
-        result = bundle_adjust(
-            found, refine_intrinsics=job.settings.camera is None, loss="soft_l1",
-            loss_px=soft_scale(found), gauge="centres",
-        )  # fmt: skip
-    except FactorlabError as error:
-        return found, None, str(error)
-    if not result.converged:
-        return found, None, result.message
-    return result.reconstruction, result, ""
+    result, fault = None, ""
+    for gauge in ("centres", "points"):  # centres on a line, as two are, hold no gauge of their own
+        try:
+            result = bundle_adjust(
+                found, refine_intrinsics=job.settings.camera is None, loss="soft_l1",
+                loss_px=soft_scale(found), gauge=gauge,
+            )  # fmt: skip
+            break
+        except FactorlabError as error:
+            fault = fault or str(error)
+    if result is None:
+        return found, None, fault
+    if result.converged:
+        return result.reconstruction, result, ""
+    return (
+        found,
+        result,
+        f"not settled after {result.iterations} steps: the pictures leave something almost free",
+    )

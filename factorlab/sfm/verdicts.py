@@ -185,7 +185,11 @@ def _cameras(done: SfmDone) -> list[Verdict]:
         if (sigma := _focal_sigma(done, k)) is not None:
             band = (value - 1.96 * sigma, value + 1.96 * sigma)
             status = _judged(sigma / value, GOOD_FOCAL, FAIR_FOCAL)
-            action = "" if status == "PASS" else "give --camera, or add pictures from all around"
+            action = (
+                ""
+                if status == "PASS"
+                else "these pictures do not tell it: give --camera, or take some from aside"
+            )
         verdicts.append(Verdict(metric, value, band, status, meaning, action, "px"))
     return verdicts if len(verdicts) <= MOST_NAMED else verdicts[:MOST_NAMED]
 
@@ -219,10 +223,11 @@ def _percent(share: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
 
 def _adjustment(done: SfmDone) -> list[Verdict]:
     """Our own bundle adjustment against COLMAP's, on the same observations and loss."""
-    result = done.adjusted
+    result, why = done.adjusted, done.unadjusted
     if result is None:
-        why = done.unadjusted
         return [Verdict("our adjustment", None, None, "WARN", why, "no covariances are given")] if why else []
+    if why:
+        return [Verdict("our adjustment", None, None, "WARN", why, "look at the band of the focal length")]
     change = result.cost / result.initial_cost - 1.0
     status: Status = "PASS" if abs(change) <= GOOD_AGREEMENT else "WARN"
     meaning = f"change of the mapper's cost by our own, {result.iterations} steps ({result.route})"

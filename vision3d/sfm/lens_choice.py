@@ -17,7 +17,7 @@ from vision3d.sfm.settling import adjusted
 __all__ = ["with_second_coefficient"]
 
 STRICT, WORTH = 3.0, 0.02
-ENOUGH = 200  # points, below which there is no choice to make
+FEWEST, ENOUGH = 3, 200  # pictures and points, below which there is no choice to make
 
 
 def with_second_coefficient(found: Reconstruction, soft_px: float) -> Reconstruction | None:
@@ -27,7 +27,11 @@ def with_second_coefficient(found: Reconstruction, soft_px: float) -> Reconstruc
     ----------
     soft_px : scale of the soft-L1 loss that it was adjusted with
     """
-    if len(found.points) < ENOUGH or any(camera.lens != "brown1" for camera in found.cameras):
+    if (
+        len(found) < FEWEST
+        or len(found.points) < ENOUGH
+        or any(camera.lens != "brown1" for camera in found.cameras)
+    ):
         return None
     cameras = tuple(
         Camera("brown2", one.intrinsics, (*one.distortion, 0.0), one.size) for one in found.cameras

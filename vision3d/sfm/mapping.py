@@ -36,6 +36,8 @@ def map_pictures(
     with tempfile.TemporaryDirectory(prefix="factorlab-sfm-") as folder:
         if settings.mapper == "global":
             options = _global_options(theirs, settings)
+            if count == 2:
+                _for_two(options)
             progress("global mapping", 0, 1)
 
             def solve(_: Any) -> Any:
@@ -47,6 +49,8 @@ def map_pictures(
             models = patience.run(solve)
         else:
             incremental = _incremental_options(theirs, settings)
+            if count == 2:
+                incremental.triangulation.ignore_two_view_tracks = False
             placed = [2]
 
             def grown() -> None:
@@ -70,6 +74,7 @@ def map_pictures(
                 # a drive straight ahead, or a short step: less is asked of the pair to start from
                 incremental.mapper.init_max_forward_motion = 1.0
                 incremental.mapper.init_min_tri_angle = SMALL_ANGLE_DEG
+                incremental.triangulation.ignore_two_view_tracks = False
                 placed[0] = 2
                 models = patience.run(grow)
     return sorted(_useful(models), key=lambda one: (-one.num_reg_images(), -one.num_points3D()))
@@ -97,6 +102,15 @@ def _incremental_options(theirs: Any, settings: SfmSettings) -> Any:
         options.mapper.abs_pose_refine_focal_length = False
         options.mapper.abs_pose_refine_extra_params = False
     return options
+
+
+def _for_two(options: Any) -> None:
+    """Points that two pictures see are all that there is."""
+    mapper = options.mapper
+    options.min_model_size = 2
+    mapper.track_min_num_views_per_track = mapper.global_positioning.min_num_view_per_track = 2
+    mapper.bundle_adjustment.min_track_length = 2
+    mapper.retriangulation.ignore_two_view_tracks = False
 
 
 def _global_options(theirs: Any, settings: SfmSettings) -> Any:

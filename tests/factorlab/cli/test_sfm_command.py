@@ -149,3 +149,30 @@ def test_an_interruption_keeps_the_features(folder, tmp_path):
     again = run(folder / "photos", "-o", tmp_path / "out", "--no-refine")
     assert again.exit_code == 0, again.stderr
     assert not (tmp_path / "out.work").exists()
+
+
+def test_two_pictures_get_standard_deviations(folder):
+    """Their centres hold no gauge of their own; that of the points does."""
+    pair = run(
+        folder / "photos/desk1.png", folder / "photos/desk3.png", "--camera", folder / "camera.json", "--json"
+    )
+    assert pair.exit_code == 0, pair.stderr
+    document = json.loads(pair.stdout)
+    assert document["adjustment"]["gauge"] == "points"
+    assert min(document["adjustment"]["sigma_place"]) > 0.0
+
+
+def test_a_slide_does_not_tell_the_focal_length(folder, tmp_path):
+    """Parallel cameras: the residuals are small at any focal length, and the band says so."""
+    from vision3d.render import desk, render_scene
+
+    rng = np.random.default_rng(6)
+    scene = desk(rng)
+    for k in range(4):
+        pose = np.array([1.0, 0.0, 0.0, 0.0, -0.08 * k, 0.0, 0.0])
+        cv2.imwrite(str(tmp_path / f"slide{k}.png"), render_scene(SMALL, pose, scene, rng=rng).image)
+    slide = run(tmp_path, "--lens", "pinhole", "--json")
+    document = json.loads(slide.stdout)
+    told = next(one for one in document["verdicts"] if one["metric"] == "focal length")
+    assert told["verdict"] in {"WARN", "FAIL"}
+    assert "give --camera" in told["action"]
