@@ -16,7 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from factorlab.graph.bundle_native import native_bundle, optimise_bundle
+from factorlab.graph.bundle_native import (
+    ESTIMATORS,
+    native_bundle,
+    optimise_bundle,
+    optimise_reweighted,
+)
 from sequential.errors import DataError, ModelError, SolverError
 from vision3d.sfm.adjustment import Adjusted, adjust, cost_of
 from vision3d.sfm.bundle_covariance import bundle_covariances, noise_px
@@ -31,6 +36,8 @@ __all__ = ["BundleResult", "bundle_adjust"]
 Array = NDArray[np.float64]
 
 ROUTES = ("auto", "native", "compiled")
+FEW = 20_000
+"""Observations up to which GTSAM's factors are weighed anew, round by round, for a loss that it lacks."""
 SETTLED = 1e-6
 """Share of the cost that one more step may still promise."""
 
@@ -166,16 +173,18 @@ def _solve(
     problem: BundleProblem, start: BundleState, loss: str, loss_px: float, route: str, iterations: int
 ) -> tuple[Adjusted, str]:
     """Where the solve ended, and by which route."""
-    native = None if route == "compiled" else native_bundle(problem, start, loss=loss, loss_px=loss_px)
-    if native is None and route == "native":
-        raise ModelError(
-            "GTSAM has no factor for this lens, these free parameters or this loss; use route='auto'"
-        )
     state, steps, taken = start, 0, "compiled"
-    if native is not None:
+    if route != "compiled":
         try:
-            values, steps = optimise_bundle(native, iterations)
-            state, taken = native.state(values, start), "native"
+            found = None
+            if route == "native" or loss in ("none", *ESTIMATORS) or len(problem.images) <= FEW:
+                found = _natively(problem, start, loss, loss_px, iterations)
+            if found is None and route == "native":
+                raise ModelError(
+                    "GTSAM has no factor for this lens with what is free in it; use route='auto'"
+                )
+            if found is not None:
+                (state, steps), taken = found, "native"
         except SolverError:
             if route == "native":
                 raise
@@ -187,6 +196,20 @@ def _solve(
         cost, decrement = decrement_of(problem, state, loss, loss_px)
     before = cost_of(problem.residuals(start), loss, loss_px)[0]
     return Adjusted(state, cost, before, decrement, steps, decrement <= SETTLED * cost), taken
+
+
+def _natively(
+    problem: BundleProblem, start: BundleState, loss: str, loss_px: float, iterations: int
+) -> tuple[BundleState, int] | None:
+    """Where GTSAM ends, and its iterations; None where it lacks a factor."""
+    if loss not in {"none", *ESTIMATORS}:
+        able = native_bundle(problem, start) is not None
+        return optimise_reweighted(problem, start, loss, loss_px, iterations) if able else None
+    native = native_bundle(problem, start, loss=loss, loss_px=loss_px)
+    if native is None:
+        return None
+    values, steps = optimise_bundle(native, iterations)
+    return native.state(values, start), steps
 
 
 def _message(solved: Adjusted) -> str:

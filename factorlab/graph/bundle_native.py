@@ -6,8 +6,8 @@
 | one focal length, k1 and k2 at most, free | `GeneralSFMFactor2` | `Cal3Bundler` |
 | fx, fy, and others, free | `GeneralSFMFactor2` | `Cal3_S2`, `Cal3DS2`, `Cal3Fisheye` |
 
-Lenses with more terms than `brown4`, one focal length tied among other free parameters, and the loss soft_l1
-have none; such problems go the compiled way, `vision3d.sfm.adjustment`.
+Lenses with more terms than `brown4`, and one focal length tied among other free parameters, have none: such
+problems go the compiled way, `vision3d.sfm.adjustment`.  The loss soft_l1 is met by weighing anew.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from factorlab.graph.solve import readable
 from vision3d.rigid import inverse
+from vision3d.sfm.adjustment import cost_of
 from vision3d.sfm.bundle_problem import BundleProblem, BundleState
 from vision3d.sfm.gauge import farthest
 
-__all__ = ["NativeBundle", "native_bundle"]
+__all__ = ["NativeBundle", "native_bundle", "optimise_bundle", "optimise_reweighted"]
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ HELD = 1e-7
 """Standard deviation of what is held: parameters in their units, poses in rad and in sizes of the scene."""
 GAUGE = 1e-2
 """The same of what only fixes the gauge: it is met exactly, whatever its weight, and a light one bends."""
+LEAST_WEIGHT, STEPS_A_ROUND = 1e-12, 2
 ESTIMATORS = {"huber": gtsam.noiseModel.mEstimator.Huber, "cauchy": gtsam.noiseModel.mEstimator.Cauchy}
 FIXED = {
     "Cal3_S2": gtsam.GenericProjectionFactorCal3_S2,
@@ -96,9 +98,14 @@ def kind_of(lens: str, free: tuple[str, ...]) -> str | None:
 
 
 def native_bundle(
-    problem: BundleProblem, state: BundleState, *, loss: str = "none", loss_px: float = 1.0
+    problem: BundleProblem,
+    state: BundleState,
+    *,
+    loss: str = "none",
+    loss_px: float = 1.0,
+    weights: Array | None = None,
 ) -> NativeBundle | None:
-    """The problem in native factors, or None where a piece has none.
+    """The problem in native factors, or None where a piece has none; `weights` (K,) are of the observations.
 
     The gauge is fixed by a prior on the first pose, unless poses are held, and one on its distance to the
     farthest; both are met exactly and cost nothing.
@@ -122,16 +129,21 @@ def native_bundle(
         if free[c]:
             values.insert(K(c), calibration)
             _hold_parameters(graph, problem, c, kind, calibration)
-    _observe(graph, problem, named, free, calibrations, _noise(loss, loss_px))
+    noises = _noises(problem, loss, loss_px, weights)
+    _observe(graph, problem, named, free, calibrations, noises)
     _hold_gauge(graph, values, problem, state)
     return NativeBundle(graph, values, named, free, problem.held)
 
 
-def _noise(loss: str, loss_px: float) -> Any:
-    unit = gtsam.noiseModel.Unit.Create(2)
-    if loss == "none":
-        return unit
-    return gtsam.noiseModel.Robust.Create(ESTIMATORS[loss].Create(loss_px), unit)
+def _noises(problem: BundleProblem, loss: str, loss_px: float, weights: Array | None) -> list[Any]:
+    """The noise model of every observation."""
+    if weights is not None:
+        sigmas = (1.0 / np.sqrt(np.maximum(weights, LEAST_WEIGHT))).tolist()
+        return [gtsam.noiseModel.Isotropic.Sigma(2, sigma) for sigma in sigmas]
+    noise = gtsam.noiseModel.Unit.Create(2)
+    if loss != "none":
+        noise = gtsam.noiseModel.Robust.Create(ESTIMATORS[loss].Create(loss_px), noise)
+    return [noise] * len(problem.images)
 
 
 def _observe(
@@ -140,11 +152,11 @@ def _observe(
     kinds: tuple[str, ...],
     free: tuple[bool, ...],
     calibrations: list[Any],
-    noise: Any,
+    noises: list[Any],
 ) -> None:
     """One factor for every observation."""
-    camera_of = problem.camera_of.tolist()
-    for i, j, pixel in zip(problem.images.tolist(), problem.tracks.tolist(), problem.pixels, strict=True):
+    camera_of, images, tracks = problem.camera_of.tolist(), problem.images.tolist(), problem.tracks.tolist()
+    for i, j, pixel, noise in zip(images, tracks, problem.pixels, noises, strict=True):
         c = camera_of[i]
         if free[c]:
             graph.add(FREE[kinds[c]](pixel, noise, X(i), L(j), K(c)))
@@ -194,6 +206,27 @@ def optimise_bundle(native: NativeBundle, iterations: int) -> tuple[Any, int]:
         optimizer = gtsam.LevenbergMarquardtOptimizer(native.graph, native.values, parameters)
         values = optimizer.optimize()
     return values, int(optimizer.iterations())
+
+
+def optimise_reweighted(
+    problem: BundleProblem, state: BundleState, loss: str, loss_px: float, iterations: int
+) -> tuple[BundleState, int]:
+    """The same for a loss that GTSAM does not have: weighted least squares, weighed anew until it settles.
+
+    The losses here bend down as residuals grow, so that no round raises the cost (Huber 1981, section 7.8).
+    """
+    cost, weights = cost_of(problem.residuals(state), loss, loss_px)
+    steps = 0
+    while steps < iterations:
+        native = native_bundle(problem, state, weights=weights)
+        if native is None:
+            break
+        values, made = optimise_bundle(native, STEPS_A_ROUND)
+        state, steps, before = native.state(values, state), steps + max(made, 1), cost
+        cost, weights = cost_of(problem.residuals(state), loss, loss_px)
+        if cost >= before * (1.0 - 1e-11):
+            break
+    return state, steps
 
 
 def _calibration(kind: str, p: Array) -> Any:

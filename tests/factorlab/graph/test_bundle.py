@@ -187,6 +187,7 @@ def test_dubrovnik(data_dir):
 def test_balbianello_ends_where_colmap_ends(loss, cost, data_dir):
     model = read_bundler(data_dir / "vision" / "balbianello" / "Balbianello.out", size=(640, 427))
     found = bundle_adjust(model, loss=loss)
+    assert found.route == "native"
     # COLMAP 4.2.1's final cost from this file, one camera for every image
     assert found.cost == pytest.approx(cost, rel=1e-6)
     assert (np.linalg.eigvalsh(found.point_covs) > 0.0).all()
