@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Sharper", "again"]
 
 Array = NDArray[np.float64]
+WINDOW_PX = 6.4  # distance over which errors of aligned windows are correlated: √2 times their Gaussian's
 ALIKE, LONGER = 0.95, 1.1  # new matches keep below that quantile of the inliers' distances, and a little
 
 
@@ -57,11 +58,11 @@ def again(first: Geometry, done: Matched) -> Sharper:
         found = fit_model(first.kind, pixels_a, pixels_b, settings, sigma=sigma, rng=rng)
     if found is None or found.count < first.count // 2:
         return Sharper(first, done.pixels_a, done.pixels_b, done.sigma_px, done.matches)
-    return Sharper(_honest(found, sigma), pixels_a, pixels_b, sigma, matches)
+    return Sharper(_honest(found, sigma, pixels_a), pixels_a, pixels_b, sigma, matches)
 
 
-def _honest(found: Geometry, sigma: Array) -> Geometry:
-    """The covariance raised where the inliers err by more than their sigmas: no plane, or a bent lens."""
+def _honest(found: Geometry, sigma: Array, pixels_a: Array) -> Geometry:
+    """The covariance raised for errors beyond the sigmas (no plane, a bent lens), and for shared windows."""
     if found.cov is None or found.count < 10:
         return found
     dims = 2 if found.kind == "homography" else 1
@@ -69,4 +70,13 @@ def _honest(found: Geometry, sigma: Array) -> Geometry:
     squares = np.sort((found.errors_px[at] / sigma[at]) ** 2 / dims)
     # the middle of chi squared with one or two degrees of freedom over its mean
     typical = float(np.median(squares)) / (0.693 if dims == 2 else 0.455)
-    return replace(found, cov=found.cov * max(1.0, typical))
+    return replace(found, cov=found.cov * max(1.0, typical) * _shared(pixels_a[at]))
+
+
+def _shared(points: Array) -> float:
+    """How many times the same light was counted: windows of near matches overlap, and so do their errors."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(points).query_pairs(3.0 * WINDOW_PX, output_type="ndarray")
+    away = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    return 1.0 + 2.0 * float(np.exp(-0.5 * (away / WINDOW_PX) ** 2).sum()) / len(points)
