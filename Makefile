@@ -15,8 +15,9 @@ PACKAGES := chromium gcc g++ make \
 	/usr/include/libelf.h:libelf-dev /usr/share/arduino/hardware/arduino/avr/cores/arduino/Arduino.h:arduino-core-avr \
 	cppcheck clang /usr/lib/llvm-*/lib/clang/*/include/fuzzer:libclang-rt-dev
 # what looks at images
-VISION_TESTS := tests/vision3d tests/test_image_conventions.py tests/factorlab/camera tests/factorlab/markers tests/factorlab/live \
-	tests/factorlab/cli/test_sheet.py $(patsubst %,tests/factorlab/cli/test_%_command.py,camera line live objects undistort)
+VISION_TESTS := tests/vision3d tests/test_image_conventions.py \
+	$(patsubst %,tests/factorlab/%,camera markers live match stereo) tests/factorlab/cli/test_sheet.py \
+	$(patsubst %,tests/factorlab/cli/test_%_command.py,camera line live objects sfm undistort)
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
