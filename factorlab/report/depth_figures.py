@@ -86,7 +86,7 @@ def depth(run: DepthRun) -> Figure | None:
     given = run.depth
     if given is None:
         return None
-    figure, axes = _two(run, extra=0.5)
+    figure, axes = _two(run, extra=0.8)
     z = given.z_m[given.measured]
     low, high = np.percentile(z, [1, 98])
     _show(axes[0], _paint(given.z_m, low, high, f"{NEAR_FAR}_r"), "")
@@ -138,7 +138,7 @@ def ground(run: DepthRun) -> Figure | None:
 
     if run.ground is None or run.depth is None or run.geometry is None or run.cloud is None:
         return None
-    figure, axes = _two(run, extra=0.5)
+    figure, axes = _two(run, extra=0.8)
     points = back_project(run.depth, run.geometry.camera)
     heights = np.where(run.depth.measured, run.ground.height_of(np.nan_to_num(points)), np.nan)
     top = float(np.nanpercentile(heights, 98))
@@ -175,7 +175,7 @@ def truth(run: DepthRun) -> Figure | None:
     """Errors of disparity, and errors over their standard deviation."""
     if run.pair.truth_px is None:
         return None
-    figure, axes = _two(run, extra=0.5)
+    figure, axes = _two(run, extra=0.8)
     found = run.disparity
     error = found.map_px - run.pair.truth_px
     _show(axes[0], _paint(error, -3.0, 3.0, "RdBu_r", none=0.6), "")

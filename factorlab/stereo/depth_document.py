@@ -36,7 +36,7 @@ GROUND_READ = (
 DEPTH_READ = "Left: depth. Right: its standard deviation over depth; one dot is one matched pixel."
 TRUTH_READ = (
     "Left: error of disparity, clipped at ±3 px; grey where the truth is not known. Right: error over "
-    "standard deviation of matched pixels, beside the normal density."
+    "standard deviation of matched pixels beside the normal density; the last bars hold what lies beyond."
 )
 
 

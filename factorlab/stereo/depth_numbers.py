@@ -24,7 +24,8 @@ class Accuracy:
     bad1_all, bad2_all : share off by more than 1 and 2 px, or without a disparity
     bad2_matched : the same of those that were matched
     median_px : of the absolute error of those that were matched
-    z_rms : root mean square of error / std of matched pixels that are off by less than 1 px
+    z_spread : of error / std of matched pixels, by the median: 1 is honest.  A truth in whole numbers adds
+        what rounding does to it
     within_2std : share of matched pixels whose error is below two standard deviations
     """
 
@@ -33,7 +34,7 @@ class Accuracy:
     bad2_all: float
     bad2_matched: float
     median_px: float
-    z_rms: float
+    z_spread: float
     within_2std: float
 
 
@@ -50,17 +51,24 @@ def accuracy_of(run: DepthRun) -> Accuracy | None:
         return None
     with np.errstate(invalid="ignore"):
         error = np.abs(run.disparity.map_px - truth)
-        near = matched & (error < 1.0)
-        z = error / run.disparity.std_px
+        z = error / np.hypot(run.disparity.std_px, _rounding(truth[known]))
         return Accuracy(
             int(known.sum()),
             float((~(error <= 1.0))[known].mean()),
             float((~(error <= 2.0))[known].mean()),
             float((error > 2.0)[matched].mean()),
             float(np.median(error[matched])),
-            float(np.sqrt(np.mean(z[near] ** 2))),
+            float(np.median(z[matched]) / 0.6745),
             float((z <= 2.0)[matched].mean()),
         )
+
+
+def _rounding(truth: Any) -> float:
+    """Standard deviation, px, that rounding gave a truth: of whole pixels, or of whole sixteenths."""
+    for step in (1.0, 0.5, 0.25, 0.125, 0.0625):
+        if np.all(truth % step == 0.0):
+            return step / float(np.sqrt(12.0))
+    return 0.0
 
 
 def share_at_edge(run: DepthRun) -> float:

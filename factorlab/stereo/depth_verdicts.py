@@ -179,7 +179,7 @@ def _truth(run: DepthRun) -> list[Verdict]:
     if accuracy is None:
         return []
     status: Status = "PASS" if accuracy.bad2_all <= 0.15 else "WARN" if accuracy.bad2_all <= 0.3 else "FAIL"
-    honest = HONEST[0] <= accuracy.z_rms <= HONEST[1]
+    honest = HONEST[0] <= accuracy.z_spread <= HONEST[1]
     return [
         Verdict(
             "off by more than 2 px", 100 * accuracy.bad2_all, (0.0, 15.0), status,
@@ -187,7 +187,7 @@ def _truth(run: DepthRun) -> list[Verdict]:
             f"{100 * accuracy.bad2_matched:.1f} % of the matched ones", unit="%",
         ),
         Verdict(
-            "error / σ", accuracy.z_rms, HONEST, "PASS" if honest else "WARN",
-            f"RMS of matches on the right surface; median error {accuracy.median_px:.2f} px",
+            "error / σ", accuracy.z_spread, HONEST, "PASS" if honest else "WARN",
+            f"spread over the matched pixels, 1 is honest; median error {accuracy.median_px:.2f} px",
         ),
     ]  # fmt: skip
