@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vision3d.stereo.geometry import PairGeometry
     from vision3d.stereo.pair import Light
     from vision3d.stereo.planes import DepthPlane
+    from vision3d.stereo.repetition import Repetition
     from vision3d.stereo.rows import RowCheck
 
 __all__ = ["DepthRun", "DepthSettings", "measure_depth"]
@@ -67,6 +68,7 @@ class DepthRun:
     geometry: PairGeometry | None
     rows: RowCheck
     light: Light
+    repetition: Repetition
     disparity: Disparity
     depth: Depth | None
     cloud: DepthCloud | None
@@ -87,6 +89,7 @@ def measure_depth(
     """
     from vision3d.stereo.disparity import compute_disparity
     from vision3d.stereo.pair import light_of, require_pair
+    from vision3d.stereo.repetition import repetition
     from vision3d.stereo.rows import row_check
 
     clock = _Clock(progress)
@@ -99,6 +102,8 @@ def measure_depth(
     _require_order(pair, rows, 0.0 if geometry is None else geometry.doffs_px, known=geometry is not None)
     clock.done("row check")
     disparity = compute_disparity(a, b, settings.stereo)
+    least, most = disparity.range_px
+    again = repetition(a, most - least)
     if turned:
         disparity = _disparity_turned(disparity)
     clock.done("matching")
@@ -111,8 +116,8 @@ def measure_depth(
         cloud, planes, ground = _solids(depth, geometry, left, settings)
     clock.done("planes")
     return DepthRun(
-        pair, settings, left, right, geometry, rows, light_of(*require_pair(a, b)), disparity, depth, cloud,
-        planes, ground, clock.seconds,
+        pair, settings, left, right, geometry, rows, light_of(*require_pair(a, b)), again, disparity, depth,
+        cloud, planes, ground, clock.seconds,
     )  # fmt: skip
 
 

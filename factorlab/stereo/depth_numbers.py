@@ -96,6 +96,7 @@ def depth_numbers(run: DepthRun) -> dict[str, Any]:
             "rectified": run.rows.rectified,
         },
         "light": {"gain": run.light.gain.tolist(), "offset": run.light.offset.tolist()},
+        "repetition": run.repetition._asdict(),
         "disparity": _disparity(run),
         "seconds": run.seconds,
     }

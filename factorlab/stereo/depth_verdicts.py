@@ -13,13 +13,14 @@ __all__ = ["depth_conclusion", "depth_verdicts"]
 ROWS_GOOD, ROWS_BAD = 0.5, 1.0  # px
 MANY, SOME = 0.6, 0.25  # share of the pixels that are matched
 AT_EDGE = 0.01
+REPEATED = 0.2  # of the textured patches
 BEHIND = 0.9  # of the matches, where nothing is known of the cameras
 HONEST = (0.6, 1.6)
 
 
 def depth_verdicts(run: DepthRun) -> list[Verdict]:
     """All of them, what is wrong with the pictures first."""
-    found = [_rows(run), *_order(run), *_light(run), _matched(run), *_edge(run)]
+    found = [_rows(run), *_order(run), *_light(run), *_repeated(run), _matched(run), *_edge(run)]
     if run.disparity.valid.any():
         found += [_std(run), *_depth(run), *_ground(run), *_truth(run)]
     return found
@@ -89,6 +90,20 @@ def _light(run: DepthRun) -> list[Verdict]:
             "light of the pictures", gain, (0.97, 1.03), "WARN" if strong else "INFO",
             f"left = {gain:.2f} · right {offset:+.0f} levels; brought together before matching",
             "fix exposure and gain of both cameras" if strong else "",
+        )
+    ]  # fmt: skip
+
+
+def _repeated(run: DepthRun) -> list[Verdict]:
+    again = run.repetition
+    if again.share < REPEATED:
+        return []
+    return [
+        Verdict(
+            "repeated texture", 100 * again.share, (0.0, 100 * REPEATED), "WARN",
+            f"so many patches look the same about {again.period_px:.0f} px farther along their row: matches "
+            "may be one period off, and confirm each other",
+            "bound the search by --min-disparity and --max-disparity; look at the confidence", "%",
         )
     ]  # fmt: skip
 
