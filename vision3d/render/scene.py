@@ -153,14 +153,14 @@ def _paint(image: NDArray[np.float32], camera: Camera, plane: Plane, moment: flo
     texture = plane.texture
     samples = supersample**2 if texture.is_picture else CURVED * supersample**2
     paint(
-        image, _corner_rays(camera), np.linalg.inv(axes), texture.kind,
+        image, corner_rays(camera), np.linalg.inv(axes), texture.kind,
         texture.x_edges, texture.y_edges, texture.values, texture.radii, texture.inner,
-        _lattice(samples),
+        lattice(samples),
     )  # fmt: skip
 
 
 @lru_cache(maxsize=3)
-def _corner_rays(camera: Camera) -> NDArray[np.float64]:
+def corner_rays(camera: Camera) -> NDArray[np.float64]:
     """Rays (h + 1, w + 1, 3) through the corners of the pixels, kept for the next image of this camera."""
     width, height = camera.size
     u, v = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
@@ -168,7 +168,7 @@ def _corner_rays(camera: Camera) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=16)
-def _lattice(count: int) -> NDArray[np.float64]:
+def lattice(count: int) -> NDArray[np.float64]:
     """Points (count, 2) of the unit square: no two share a row or a column, and none is near another.
 
     A rank-1 lattice; its generator is the one whose nearest points, round the edges, are farthest apart.

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import ModelError, ShapeError
 from sequential.manifold.quaternion import rotation_matrix
-from vision3d.render.scene import BACKGROUND, EXPOSURE, _corner_rays, _lattice
+from vision3d.render.scene import BACKGROUND, EXPOSURE, corner_rays, lattice
 from vision3d.render.shapes import Shape
 from vision3d.rigid import inverse, transform
 
@@ -176,12 +176,12 @@ def _radiance(
     from vision3d.kernels.scenes import photograph
 
     world_T_camera = inverse(pose)
-    rays = np.ascontiguousarray(_corner_rays(camera) @ rotation_matrix(world_T_camera[:4]).T)
+    rays = np.ascontiguousarray(corner_rays(camera) @ rotation_matrix(world_T_camera[:4]).T)
     tints = np.array([shape.tint for shape in scene.shapes]) if colour else np.ones((len(scene.shapes), 1))
     image = np.empty((camera.size[1], camera.size[0], tints.shape[1]), np.float32)
     light = np.array(scene.light) / np.linalg.norm(scene.light)
     photograph(
-        scene.table, *scene.pyramids, tints, world_T_camera[4:].copy(), rays, _lattice(supersample**2),
+        scene.table, *scene.pyramids, tints, world_T_camera[4:].copy(), rays, lattice(supersample**2),
         light, scene.ambient, scene.background, image,
     )  # fmt: skip
     return image
