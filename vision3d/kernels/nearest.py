@@ -52,21 +52,27 @@ def two_nearest(table, pixels_b, apart_px, first_row, best, nearest, second, bes
     for i in range(len(table)):
         row = table[i]
         at, least = -1, np.float32(np.inf)
+        rival, other = -1, np.float32(np.inf)
         for j in range(len(row)):
             d = row[j]
-            if d < least:
-                at, least = j, d
+            if d < other:
+                if d < least:
+                    rival, other = at, least
+                    at, least = j, d
+                else:
+                    rival, other = j, d
             if d < nearest_of_b[j]:
                 nearest_of_b[j] = d
                 best_of_b[j] = first_row + i
-        other = np.float32(np.inf)
-        if at >= 0:
+        if rival >= 0 and limit > 0.0:
             x, y = pixels_b[at, 0], pixels_b[at, 1]
-            for j in range(len(row)):
-                if row[j] < other and j != at:
-                    u, v = pixels_b[j, 0] - x, pixels_b[j, 1] - y
-                    if u * u + v * v >= limit:
-                        other = row[j]
+            if (pixels_b[rival, 0] - x) ** 2 + (pixels_b[rival, 1] - y) ** 2 < limit:
+                other = np.float32(np.inf)
+                for j in range(len(row)):
+                    if row[j] < other and j != at:
+                        u, v = pixels_b[j, 0] - x, pixels_b[j, 1] - y
+                        if u * u + v * v >= limit:
+                            other = row[j]
         best[first_row + i] = at
         nearest[first_row + i] = least
         second[first_row + i] = other
