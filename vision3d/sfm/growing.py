@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from vision3d.camera import Camera
 from vision3d.sfm.growth import Growth, GrowthSettings, Scene
 from vision3d.sfm.placing import place_image
 from vision3d.sfm.reconstruction import Reconstruction
@@ -20,12 +21,13 @@ from vision3d.sfm.seeding import PairGeometry, seeds
 from vision3d.sfm.spanning import span_tracks
 from vision3d.sfm.tracks import Tracks, build_tracks
 
-__all__ = ["Adjust", "grow"]
+__all__ = ["Adjust", "grow", "plausible"]
 
 Adjust = Callable[[Reconstruction, bool], Reconstruction]
 """A bundle adjustment: a reconstruction, and whether its intrinsics move, gives the adjusted one."""
 
 TRIALS = 3  # pairs to begin from, before the best that was had is kept
+PLAUSIBLE_FOCAL = (0.25, 8.0)  # of the longer side: 127° to 7° across
 ENOUGH = 0.9  # share of the images that ends the search for a better beginning
 
 
@@ -68,6 +70,12 @@ def plain_adjust(found: Reconstruction, refine: bool) -> Reconstruction:  # noqa
     return resettled(found, problem, adjust(problem, start, loss="soft_l1", settled=1e-7).state)
 
 
+def plausible(camera: Camera) -> bool:
+    """Whether a focal length is one that lenses have."""
+    shares = camera.intrinsics[:2] / max(camera.size)
+    return bool((shares >= PLAUSIBLE_FOCAL[0]).all() and (shares <= PLAUSIBLE_FOCAL[1]).all())
+
+
 def _grown_from(
     pair: PairGeometry,
     scene: Scene,
@@ -107,7 +115,11 @@ def _settle(growth: Growth, adjust: Adjust) -> None:
     """Adjust the whole, and look again at what fits it and what does not."""
     found = growth.reconstruction()
     refine = growth.scene.calibrate and len(growth.placed) >= growth.settings.calibrate_from
-    growth.take(adjust(found, refine))
+    moved = adjust(found, refine)
+    if not all(plausible(camera) for camera in moved.cameras):
+        # too little depth to calibrate by: the focal length runs away, and takes the rest along
+        moved = adjust(found, False)  # noqa: FBT003 - the callable's signature
+    growth.take(moved)
     growth.review()
     span_tracks(growth)
 

@@ -16,7 +16,7 @@ from vision3d.sfm.bundle_problem import bundle_problem, resettled
 from vision3d.sfm.colmap import camera_from_pycolmap, camera_to_pycolmap, pixels_from_colmap
 from vision3d.sfm.extraction import PictureFeatures
 from vision3d.sfm.focal_sweep import sweep_focal
-from vision3d.sfm.growing import Adjust, grow
+from vision3d.sfm.growing import Adjust, grow, plausible
 from vision3d.sfm.growth import GrowthSettings, Scene
 from vision3d.sfm.library import colmap
 from vision3d.sfm.noise import noise_of
@@ -108,7 +108,10 @@ def _settled(found: Reconstruction, *, refine: bool) -> Reconstruction:
     for last in (False, False, True):
         problem, start = bundle_problem(found, refine=refine)
         solved = adjust(problem, start, loss="soft_l1", loss_px=SOFT * sigma_px)
-        found = resettled(found, problem, solved.state)
+        moved = resettled(found, problem, solved.state)
+        if not all(plausible(camera) for camera in moved.cameras):
+            return _settled(found, refine=False)
+        found = moved
         if not last:
             found = found.selected(found.errors_px() <= GROSS * sigma_px)
     return found.replaced(sigma_px=noise_of(found))

@@ -76,6 +76,21 @@ def test_the_adjustment_is_passed_in(rng):
     assert calls[-1] == (5, True)
 
 
+def test_a_focal_length_that_runs_away_is_held(rng):
+    world = bundle_world(rng, views=4, points=60)
+    scene, matches = seen_from(world, rng, calibrate=True)
+
+    def runaway(found, refine):
+        problem, start = bundle_problem(found, refine=False)
+        moved = resettled(found, problem, adjust(problem, start).state)
+        wild = tuple(camera.with_parameters(camera.parameters * 50.0) for camera in moved.cameras)
+        return moved.replaced(cameras=wild) if refine else moved
+
+    found = grow(scene, verified_pairs(scene, matches), adjust=runaway)
+    assert found.names == world.names
+    assert found.cameras == world.cameras
+
+
 def test_an_image_of_something_else_is_left_out(rng):
     world = bundle_world(rng, views=4, points=60)
     pixels = np.array(world.pixels)
