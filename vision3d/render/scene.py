@@ -93,16 +93,33 @@ def render_planes(
     ModelError, ShapeError
         where a setting has no meaning, or the background another size.
     """
-    import cv2
+    check_settings(supersample, blur_px, noise, vignetting)
+    radiance = radiance_of(camera, planes, supersample=supersample, background=background)
+    return developed(radiance, rng, blur_px, noise, vignetting, exposure)
 
-    from vision3d.kernels.render import develop
 
+def check_settings(supersample: int, blur_px: float, noise: float, vignetting: float) -> None:
+    """Refuse what no lens and no sensor can do."""
     if supersample < 1 or blur_px < 0 or noise < 0 or not 0 <= vignetting <= 1:
         raise ModelError(
             "expected supersample >= 1, blur_px >= 0, noise >= 0 and vignetting 0-1; "
             f"got {supersample}, {blur_px}, {noise}, {vignetting}"
         )
-    radiance = radiance_of(camera, planes, supersample=supersample, background=background)
+
+
+def developed(
+    radiance: NDArray[np.float32],
+    rng: np.random.Generator | None,
+    blur_px: float,
+    noise: float,
+    vignetting: float,
+    exposure: float,
+) -> NDArray[np.uint8]:
+    """The image (h, w) that a lens and a sensor make of radiance (h, w)."""
+    import cv2
+
+    from vision3d.kernels.render import develop
+
     if blur_px > 0:
         radiance = np.asarray(cv2.GaussianBlur(radiance, (0, 0), blur_px), dtype=np.float32)
     normal = np.empty((0, 0), np.float32)

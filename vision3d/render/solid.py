@@ -18,7 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import ModelError, ShapeError
 from sequential.manifold.quaternion import rotation_matrix
-from vision3d.render.scene import BACKGROUND, EXPOSURE, corner_rays, lattice
+from vision3d.render.scene import (
+    BACKGROUND,
+    EXPOSURE,
+    check_settings,
+    corner_rays,
+    developed,
+    lattice,
+)
 from vision3d.render.shapes import Shape
 from vision3d.rigid import inverse, transform
 
@@ -143,28 +150,13 @@ def render_scene(
     ModelError, ShapeError
         where a setting has no meaning, or the pose is not seven numbers.
     """
-    import cv2
-
-    from vision3d.kernels.render import develop
-
-    if supersample < 1 or blur_px < 0 or noise < 0 or not 0 <= vignetting <= 1:
-        raise ModelError(
-            "expected supersample >= 1, blur_px >= 0, noise >= 0 and vignetting 0-1; "
-            f"got {supersample}, {blur_px}, {noise}, {vignetting}"
-        )
+    check_settings(supersample, blur_px, noise, vignetting)
     pose = _pose(camera_T_world)
     radiance = _radiance(camera, pose, scene, supersample, colour=colour)
-    channels = []
-    for plane in np.moveaxis(radiance, 2, 0):
-        seen = np.ascontiguousarray(plane)
-        if blur_px > 0:
-            seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), blur_px), dtype=np.float32)
-        normal = np.empty((0, 0), np.float32)
-        if rng is not None and noise > 0:
-            normal = rng.standard_normal(seen.shape, dtype=np.float32)
-        developed = np.empty(seen.shape, np.uint8)
-        develop(seen, normal, exposure, vignetting, noise, developed)
-        channels.append(developed)
+    channels = [
+        developed(np.ascontiguousarray(plane), rng, blur_px, noise, vignetting, exposure)
+        for plane in np.moveaxis(radiance, 2, 0)
+    ]
     image = np.stack(channels, axis=2) if colour else channels[0]
     return RenderedView(image, *_truth(camera, pose, scene), camera, pose)
 
