@@ -148,7 +148,8 @@ def bundle_problem(
         raise ShapeError(f"fixed names image {held[-1]}, but there are {V}, counted from 0")
     order = np.argsort(r.point_index, kind="stable")
     tracks = np.ascontiguousarray(r.point_index[order], dtype=np.int64)
-    free = tuple(free_names(camera, refine) for camera in r.cameras)
+    used = set(r.camera_of.tolist())  # what no image was taken with stays as it is
+    free = tuple(free_names(camera, refine) if c in used else () for c, camera in enumerate(r.cameras))
     P, q = max(camera.count for camera in r.cameras), max(map(len, free))
     basis, parameters = np.zeros((len(free), P, q)), np.zeros((len(free), P))
     for c, camera in enumerate(r.cameras):

@@ -208,3 +208,26 @@ def test_our_mapper_grows_on_gtsam(rng):
     assert set(routes) == {"native"}
     assert found.rms_px < 0.6
     assert found.cameras[0].intrinsics[0] == pytest.approx(520.0, rel=0.02)
+
+
+def test_a_camera_without_images_stays(rng):
+    truth = bundle_world(rng)
+    spare = CAMERAS["brown4"]
+    found = bundle_adjust(truth.replaced(cameras=(*truth.cameras, spare)))
+    assert found.reconstruction.cameras[1] == spare
+    assert found.free[1] == ()
+    assert found.intrinsics_covs[1].shape == (0, 0)
+    assert found.cost == pytest.approx(bundle_adjust(truth).cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("route", ["native", "compiled"])
+def test_points_alone_may_move(route, rng):
+    truth = bundle_world(rng, views=4, points=40)
+    points = truth.points + 0.02 * rng.standard_normal(truth.points.shape)
+    found = bundle_adjust(
+        truth.replaced(points=points), fixed=range(4), refine_intrinsics=False, route=route, sigma_px=0.5
+    )
+    np.testing.assert_array_equal(found.reconstruction.cameras_T_world, truth.cameras_T_world)
+    off = found.reconstruction.points - truth.points
+    nees = np.einsum("nx,nxy,ny->n", off, np.linalg.inv(found.point_covs), off) / 3.0
+    assert 0.6 < nees.mean() < 1.5
