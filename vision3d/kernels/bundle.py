@@ -17,9 +17,21 @@ from vision3d.kernels.lenses import project_full_one, project_one
 __all__ = ["linearize", "reproject"]
 
 
-@kernel(i0(i1, f2, i1, f2, f2, i1, i1, f2, f3, w2, w3, w3))
+@kernel(i0(i1, f2, i1, f3, f2, f2, i1, i1, f2, f3, w2, w3, w3))
 def linearize(
-    codes, parameters, camera_of, poses, points, images, tracks, pixels, basis, residuals, by_view, by_point
+    codes,
+    parameters,
+    camera_of,
+    rotations,
+    places,
+    points,
+    images,
+    tracks,
+    pixels,
+    basis,
+    residuals,
+    by_view,
+    by_point,
 ):
     """Fill what every observation says; returns how many have no projection.
 
@@ -28,7 +40,7 @@ def linearize(
     codes : (C,) lens codes
     parameters : (C, P) of the cameras, padded with zeros
     camera_of : (V,) camera of every image
-    poses : (V, 7) camera_T_world
+    rotations, places : (V, 3, 3) camera_R_world, (V, 3) of the world's origin in the cameras
     points : (N, 3) in the world
     images, tracks : (K,) image and point of every observation
     pixels : (K, 2) where it was observed
@@ -41,25 +53,15 @@ def linearize(
     q = basis.shape[2]
     d = np.empty((2, 3))
     d_parameters = np.zeros((2, P))
-    R = np.empty((3, 3))
     lost = 0
     for k in range(images.shape[0]):
         i, j = images[k], tracks[k]
         c = camera_of[i]
-        w, x, y, z = poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3]
-        R[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-        R[0, 1] = 2.0 * (x * y - w * z)
-        R[0, 2] = 2.0 * (x * z + w * y)
-        R[1, 0] = 2.0 * (x * y + w * z)
-        R[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-        R[1, 2] = 2.0 * (y * z - w * x)
-        R[2, 0] = 2.0 * (x * z - w * y)
-        R[2, 1] = 2.0 * (y * z + w * x)
-        R[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+        R = rotations[i]
         X, Y, Z = points[j, 0], points[j, 1], points[j, 2]
-        px = R[0, 0] * X + R[0, 1] * Y + R[0, 2] * Z + poses[i, 4]
-        py = R[1, 0] * X + R[1, 1] * Y + R[1, 2] * Z + poses[i, 5]
-        pz = R[2, 0] * X + R[2, 1] * Y + R[2, 2] * Z + poses[i, 6]
+        px = R[0, 0] * X + R[0, 1] * Y + R[0, 2] * Z + places[i, 0]
+        py = R[1, 0] * X + R[1, 1] * Y + R[1, 2] * Z + places[i, 1]
+        pz = R[2, 0] * X + R[2, 1] * Y + R[2, 2] * Z + places[i, 2]
         d_parameters[:, :] = 0.0
         u, v = project_full_one(codes[c], parameters[c], math.inf, px, py, pz, d, d_parameters)
         residuals[k, 0], residuals[k, 1] = pixels[k, 0] - u, pixels[k, 1] - v

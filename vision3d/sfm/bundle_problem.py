@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import ShapeError
 from sequential.manifold import SE3
+from sequential.manifold.quaternion import rotation_matrix
 from vision3d.camera import Camera
 from vision3d.rigid import inverse
 from vision3d.sfm.intrinsics import free_basis, free_names
@@ -95,8 +96,9 @@ class BundleProblem:
         K, q = len(self.images), self.basis.shape[2]
         residuals, by_view, by_point = np.empty((K, 2)), np.empty((K, 2, 6 + q)), np.empty((K, 2, 3))
         given = (self.images, self.tracks, self.pixels, self.basis)
+        turns, places = rotation_matrix(state.poses[:, :4]), np.ascontiguousarray(state.poses[:, 4:])
         lost = linearize(
-            self.codes, state.parameters, self.camera_of, state.poses, state.points, *given,
+            self.codes, state.parameters, self.camera_of, turns, places, state.points, *given,
             residuals, by_view, by_point,
         )  # fmt: skip
         return Linearized(residuals, by_view, by_point, lost)
