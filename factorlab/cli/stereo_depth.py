@@ -39,7 +39,7 @@ class Pixels(click.ParamType[int | None]):
 OPTIONS = (
     click.argument("left", metavar="[LEFT]", required=False),
     click.argument("right", metavar="[RIGHT]", required=False),
-    click.option("--calib", type=FILE, metavar="FILE",
+    click.option("--calib", type=click.Path(path_type=Path), metavar="FILE",
                  help="The rig: our JSON, Middlebury's calib.txt, OpenCV, Kalibr or ROS; without it there is "
                       "disparity, but no depth."),
     click.option("--rectified", is_flag=True, help="The pictures have been rectified with that rig already."),

@@ -28,7 +28,7 @@ __all__ = ["DepthRun", "DepthSettings", "measure_depth"]
 Image = NDArray[np.uint8]
 Progress = Callable[[str, int, int], None]
 STEPS = 5
-SWAPPED_SHARE = 0.8  # of the matches that lie beyond infinity
+SWAPPED_SHARE = 0.2  # of the matches that lie beyond infinity; a few are wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ def _disparity_turned(found: Disparity) -> Disparity:
 
 
 def _require_order(pair: StereoPair, rows: RowCheck, doffs_px: float, *, known: bool) -> None:
-    """Raise where most of what both pictures see would lie behind the cameras.
+    """Raise where much of what both pictures see lies behind the cameras, and little would if exchanged.
 
     Raises
     ------
@@ -170,7 +170,8 @@ def _require_order(pair: StereoPair, rows: RowCheck, doffs_px: float, *, known: 
     if not rows.known or not known:
         return
     behind = float(np.mean(rows.shifts_px + doffs_px < -1.0))
-    if behind > SWAPPED_SHARE:
+    exchanged = float(np.mean(doffs_px - rows.shifts_px < -1.0))
+    if behind > max(SWAPPED_SHARE, 4.0 * exchanged):
         raise DataError(
             f"{100 * behind:.0f} % of the matches lie behind the cameras: {pair.left_name} seems to be the "
             f"right picture and {pair.right_name} the left one; give them the other way round"

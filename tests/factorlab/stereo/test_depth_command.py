@@ -232,3 +232,8 @@ def test_the_motorcycle_from_files(data_dir, tmp_path):
     assert not document["geometry"]["rectified_here"]
     assert document["truth"]["bad2_all"] < 0.065
     assert document["depth"]["percentiles_m"]["50"] == pytest.approx(2.63, abs=0.05)
+    swapped = run(
+        place / "motorcycle_right.png", place / "motorcycle_left.png", "--calib", tmp_path, "--json"
+    )
+    assert swapped.exit_code == 1
+    assert "give them the other way round" in " ".join(swapped.stderr.split())
