@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sequential.errors import DataError
 from vision3d.stereo.semi_global import RawDisparity, grey_of
 
 if TYPE_CHECKING:
@@ -20,6 +21,11 @@ def opencv_match(a: Any, b: Any, first: int, last: int, how: StereoSettings) -> 
     """Match a (h, w, c) with b; ranges are rounded up to a multiple of 16 disparities.
 
     The right picture's disparity comes from a second run on the mirrored pair.
+
+    Raises
+    ------
+    DataError
+        where OpenCV refuses pictures of this size.
     """
     import cv2
 
@@ -42,8 +48,14 @@ def opencv_match(a: Any, b: Any, first: int, last: int, how: StereoSettings) -> 
         matcher = makers.StereoSGBM_create(
             first, n, BLOCK, P1=8 * channels * BLOCK**2, P2=32 * channels * BLOCK**2, mode=modes[how.matcher]
         )
-    left = _run(matcher, a, b, first)
-    mirrored = _run(matcher, np.ascontiguousarray(b[:, ::-1]), np.ascontiguousarray(a[:, ::-1]), first)
+    try:
+        left = _run(matcher, a, b, first)
+        mirrored = _run(matcher, np.ascontiguousarray(b[:, ::-1]), np.ascontiguousarray(a[:, ::-1]), first)
+    except cv2.error as error:
+        raise DataError(
+            f"OpenCV's {how.matcher} cannot match {a.shape[1]}x{a.shape[0]} px over {n} disparities; "
+            "take a shorter range, larger pictures, or the matcher semi-global"
+        ) from error
     with np.errstate(invalid="ignore"):
         right = np.where(np.isfinite(mirrored), np.round(mirrored), first - 1).astype(np.int32)[:, ::-1]
     return RawDisparity(left, np.ascontiguousarray(right), np.full(left.shape, np.nan, np.float32))

@@ -136,6 +136,17 @@ def test_what_is_no_pair_is_refused(left, right, error, said):
         compute_disparity(left, right)
 
 
+@pytest.mark.parametrize("size", [(16, 16), (16, 300), (300, 16), (17, 33)])
+def test_the_smallest_pictures(size, rng):
+    wide = rng.integers(0, 256, (size[0], size[1] + 3), dtype=np.uint8)
+    found = compute_disparity(wide[:, :-3], wide[:, 3:])
+    assert found.density > 0.7
+    assert np.median(np.abs(found.map_px[found.valid] - 3.0)) < 0.1
+    if size[1] == 16:
+        with pytest.raises(DataError, match="OpenCV's sgbm cannot match"):
+            compute_disparity(wide[:, :-3], wide[:, 3:], StereoSettings("sgbm", 0, 7))
+
+
 @pytest.mark.parametrize(
     "settings",
     [
