@@ -30,6 +30,7 @@ ERRORS_READ = (
     "Left: distances from the model. Right: arrows from where the model has a point to where it was seen."
 )
 EPIPOLAR_READ = "Left: Sampson's distances. Right: green agree, orange do not."
+EACH_LIES = "A few matches that agree; each lies on the line that the other picture's point gives it."
 HOMOGRAPHY_READ = (
     "Pixels of the first picture to pixels of the second, (x', y', 1) ~ H (x, y, 1); the centre of the "
     "top-left pixel is (0, 0). The covariance of its nine elements, for unit norm, is in geometry.json."
@@ -85,6 +86,11 @@ def _sections(done: Matched) -> list[Section]:
     if geometry.kind == "homography":
         sections += [_homography(geometry), _corners(done, geometry)]
     elif geometry.kind == "fundamental":
+        sections.append(
+            Section(
+                "Epipolar lines", figure=lambda: figures.epipolar_lines(done, geometry), caption=EACH_LIES
+            )
+        )
         sections.append(_matrix("Fundamental matrix", geometry.matrix, EPIPOLAR_MATRIX))
     elif geometry.two_view is not None and np.isfinite(geometry.two_view.b_T_a).all():
         sections += [_epipolar(done, geometry.two_view), _motion(geometry)]

@@ -99,4 +99,4 @@ def drawn(done: Matched) -> NDArray[np.uint8]:
         inliers = np.concatenate([inliers, np.zeros(len(refused), bool)])
         if done.geometry.kind == "homography":
             outline = corner_places(done, done.geometry)[0]
-    return draw_matches(done.a.image, done.b.image, a, b, inliers, outline=outline)
+    return draw_matches(done.a.image, done.b.image, a, b, inliers, outline=outline, most=120)

@@ -99,8 +99,7 @@ def fit_essential_pair(
     from vision3d.two_view import estimate_two_view
 
     view = estimate_two_view(
-        *cameras, a, b, sigma_px=sigma, threshold_px=None if sigma is not None else settings.threshold_px / 2,
-        rng=rng,
+        *cameras, a, b, sigma_px=sigma, threshold_px=EPIPOLAR_SHARE * settings.threshold_px, rng=rng,
     )  # fmt: skip
     return Geometry(
         "essential", view.essential, None, view.inliers, view.residuals, view.sigma_px, view.trials,

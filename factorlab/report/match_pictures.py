@@ -11,13 +11,14 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from factorlab.report.camera_figures import frame_axes, height_of
+from factorlab.report.epipolar_pictures import COLOURS, spread_choice
 from factorlab.report.style import WIDTH, blank
 
 if TYPE_CHECKING:
     from factorlab.match.fitting import Geometry
     from factorlab.match.job import Matched
 
-__all__ = ["errors", "lines"]
+__all__ = ["epipolar_lines", "errors", "lines"]
 
 AGREE, APART = "#009E73", "#D55E00"
 ENLARGED = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
@@ -43,6 +44,29 @@ def errors(done: Matched, geometry: Geometry) -> Figure | None:
         _field(axes[0, 1], done, geometry)
     else:
         _coverage(axes[0, 1], done, at)
+    return figure
+
+
+def epipolar_lines(done: Matched, geometry: Geometry) -> Figure | None:
+    """A few matches in both pictures, and the line that each lies on in the other."""
+    if not geometry.inliers.any():
+        return None
+    rows = spread_choice(done.pixels_a, geometry.inliers, len(COLOURS))
+    figure, axes = blank(max(3.0, height_of(done.b.size)), 1, 2)
+    sides = (
+        (axes[0, 0], done.a, done.pixels_a[rows], done.pixels_b[rows], geometry.matrix.T),
+        (axes[0, 1], done.b, done.pixels_b[rows], done.pixels_a[rows], geometry.matrix),
+    )
+    for ax, picture, own, other, matrix in sides:
+        frame_axes(ax, picture.size)
+        ax.imshow(picture.image, cmap="gray", vmin=0, vmax=255, alpha=0.75, interpolation="antialiased")
+        lines_of = np.column_stack([other, np.ones(len(other))]) @ matrix.T
+        for (x, y), (a, b, c), colour in zip(own, lines_of, COLOURS, strict=False):
+            foot = np.array([-c * a, -c * b]) / (a * a + b * b)
+            along = foot + np.array([b, -a]) / np.hypot(a, b)
+            ax.axline(foot.tolist(), along.tolist(), color=colour, linewidth=1.1)
+            ax.plot(x, y, "o", color=colour, markersize=5, markeredgecolor="black", markeredgewidth=0.7)
+        ax.set_title(picture.name)
     return figure
 
 
