@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from factorlab.report.camera_figures import frame_axes
-from factorlab.report.style import WIDTH, blank, legend_below, log_axis
+from factorlab.report.style import WIDTH, blank, legend_below
 from sequential.manifold.quaternion import quaternion_inverse, quaternion_multiply
 from vision3d.sfm import Reconstruction, ViewGraph
 from vision3d.sfm.geometry import upright
@@ -171,34 +171,36 @@ def _middle(ax: Axes, degrees: NDArray[Any], digits: int) -> None:
 
 
 def matches(graph: ViewGraph) -> Figure | None:
-    """The matrix of verified matches."""
+    """Verified matches of every pair, and which share of all its matches they are."""
     count = len(graph.names)
-    table = graph.matrix(graph.inliers).astype(float)
-    table[table == 0.0] = np.nan
-    side = float(np.clip(0.35 * count, 3.0, 7.5))
-    figure, axes = blank(side)
-    ax = axes[0, 0]
-    shown = ax.imshow(table, cmap="viridis", interpolation="nearest")
-    figure.colorbar(shown, ax=ax, label="verified matches", shrink=0.9)
-    step = -(-count // 40)
-    ticks = np.arange(0, count, step)
-    ax.set_xticks(ticks, [str(k + 1) for k in ticks])
-    ax.set_yticks(ticks, [f"{graph.names[k][:28]}  {k + 1}" for k in ticks])
-    ax.grid(visible=False)
-    if count <= 12:
-        for (row, column), value in np.ndenumerate(table):
-            if np.isfinite(value):
-                bright = value > 0.55 * np.nanmax(table)
-                ax.text(
-                    column,
-                    row,
-                    f"{value:.0f}",
-                    ha="center",
-                    va="center",
-                    fontsize=7.5,
-                    color="black" if bright else "white",
-                )
+    verified = graph.matrix(graph.inliers).astype(float)
+    found = graph.matrix(graph.matches).astype(float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(found > 0.0, 100.0 * verified / found, np.nan)
+    verified[verified == 0.0] = np.nan
+    figure, axes = blank(float(np.clip(0.35 * count, 2.8, 6.0)), 1, 2)
+    for ax, table, label in (
+        (axes[0, 0], verified, "verified matches"), (axes[0, 1], share, "share of all matches, %")
+    ):  # fmt: skip
+        shown = ax.imshow(table, cmap="viridis", interpolation="nearest", vmin=0.0)
+        figure.colorbar(shown, ax=ax, label=label, shrink=0.9)
+        _named(ax, table, graph.names if ax is axes[0, 0] else ("",) * count)
     return figure
+
+
+def _named(ax: Axes, table: NDArray[Any], names: tuple[str, ...]) -> None:
+    """Numbers and names along the sides, and values where there is room."""
+    count = len(table)
+    ticks = np.arange(0, count, -(-count // 40))
+    ax.set_xticks(ticks, [str(k + 1) for k in ticks])
+    ax.set_yticks(ticks, [f"{names[k][:28]}  {k + 1}" for k in ticks])
+    ax.grid(visible=False)
+    if count > 10:
+        return
+    for (row, column), value in np.ndenumerate(table):
+        if np.isfinite(value):
+            colour = "black" if value > 0.55 * np.nanmax(table) else "white"
+            ax.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize=7, color=colour)
 
 
 def loops(graph: ViewGraph, found_loops: Loops, found: Reconstruction | None) -> Figure | None:
@@ -216,8 +218,9 @@ def loops(graph: ViewGraph, found_loops: Loops, found: Reconstruction | None) ->
     inliers, errors_deg = _against(graph, found)
     if len(inliers):
         right.plot(inliers, errors_deg, ".", color=BLUE, markersize=4)
-        log_axis(right, "xy")
         right.set(xlabel="verified matches of a pair", ylabel="pair against model, °")
+        right.set_ylim(bottom=0.0)
+        right.set_xlim(left=0.0)
     else:
         right.axis("off")
     return figure

@@ -24,7 +24,10 @@ ERRORS_READ = (
     "cells of the image; arrows that turn together say that the lens model does not follow."
 )
 TRACKS_READ = "How many pictures see a point, and the largest angle between two of its rays."
-MATCHES_READ = "Matches that the geometry of two views explains; names in the order of the table."
+MATCHES_READ = (
+    "Left: matches that the geometry of two views explains. Right: which share of all matches of the pair "
+    "they are; a low one says that much of what was seen looks alike, or moved."
+)
 LOOPS_READ = (
     "Relative rotations, each from two pictures alone: composed round triangles, and against the model. "
     "False matches and repeated texture stand far out."

@@ -52,6 +52,9 @@ def _registered(done: SfmDone) -> Verdict:
 
 
 def _missing(done: SfmDone) -> list[Verdict]:
+    if done.found is None and done.graph is not None:  # why there is no model is said above, for all of them
+        unread = [one for one in done.missing if one[0] not in done.graph.names]
+        return [Verdict("left out", name, None, "WARN", reason) for name, reason in unread[:MOST_NAMED]]
     named = [Verdict("left out", name, None, "WARN", reason) for name, reason in done.missing[:MOST_NAMED]]
     more = len(done.missing) - MOST_NAMED
     if more > 0:
@@ -212,13 +215,13 @@ def _places(done: SfmDone) -> list[Verdict]:
     share = sigmas / typical_distance(found)
     worst = int(np.argmax(share))
     status = _judged(float(share[worst]), GOOD_PLACE, FAIR_PLACE)
-    meaning = f"largest σ, of {found.names[worst]}, over the distance of the points; median {_percent(share)}"
+    meaning = f"largest σ, of {found.names[worst]}, over the distance of the points; median {_ppm(share)}"
     action = "" if status == "PASS" else "add pictures between it and its neighbours"
-    return [Verdict("place of a camera", 100.0 * float(share[worst]), None, status, meaning, action, "%")]
+    return [Verdict("place of a camera", 1e6 * float(share[worst]), None, status, meaning, action, "ppm")]
 
 
-def _percent(share: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
-    return f"{100.0 * float(np.median(share)):.2g} %"
+def _ppm(share: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    return f"{1e6 * float(np.median(share)):.3g} ppm"
 
 
 def _adjustment(done: SfmDone) -> list[Verdict]:

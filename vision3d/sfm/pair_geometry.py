@@ -26,6 +26,7 @@ KINDS = {
     "WATERMARK": "watermark", "DEGENERATE": "none", "UNDEFINED": "none",
 }  # fmt: skip
 """COLMAP's words for the geometry of two views, in ours."""
+NEAR_PX, FINE_PX = 1.0, 1600.0  # of a match from its epipolar line, in pictures up to that size
 UNSURE = ("planar", "pure rotation", "flat or turned")  # by one homography
 
 
@@ -50,6 +51,8 @@ def view_graph_of(
         cameras |= dict(model.cameras)
     options = theirs.TwoViewGeometryOptions()
     options.compute_relative_pose, options.ransac.random_seed = True, seed
+    longer = max((max(one.size) for one in pictures), default=0)
+    options.ransac.max_error = NEAR_PX * max(1.0, longer / FINE_PX)
     rows: list[tuple[Any, ...]] = []
     for pair, matches in sorted(zip(pairs, counts, strict=True)):
         a, b = sorted(theirs.pair_id_to_image_pair(pair))

@@ -28,7 +28,7 @@ def test_the_focal_length_is_near_the_one_of_bundler(model):
 
 
 def test_loops_close_and_rays_cross(model):
-    assert np.degrees(np.median(model.graph.loops().errors_rad)) < 3.0
+    assert np.degrees(np.median(model.graph.loops().errors_rad)) < 1.0
     assert np.degrees(np.median(triangulation_angles(model))) > 10.0
 
 
