@@ -51,8 +51,9 @@ def view_graph_of(
         cameras |= dict(model.cameras)
     options = theirs.TwoViewGeometryOptions()
     options.compute_relative_pose, options.ransac.random_seed = True, seed
-    longer = max((max(one.size) for one in pictures), default=0)
-    options.ransac.max_error = NEAR_PX * max(1.0, longer / FINE_PX)
+    if model is not None:  # cameras are known well enough for less than COLMAP's 4 px
+        longer = max(max(one.size) for one in pictures)
+        options.ransac.max_error = NEAR_PX * max(1.0, longer / FINE_PX)
     rows: list[tuple[Any, ...]] = []
     for pair, matches in sorted(zip(pairs, counts, strict=True)):
         a, b = sorted(theirs.pair_id_to_image_pair(pair))
