@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["map_pictures"]
 
 SMALLEST_MODEL = 2
-FEWEST_POINTS = 20
+FEWEST_POINTS = 50
 SMALL_ANGLE_DEG = 2.0  # between the rays of the first pair, where none has COLMAP's 16
 
 
