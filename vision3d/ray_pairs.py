@@ -50,7 +50,10 @@ def ray_pairs(
             f"matches are pixels_a (N, 2) and pixels_b (N, 2), got {len(pixels[0])} and {len(pixels[1])}"
         )
     sigma = np.asarray(sigma_px, dtype=np.float64)
-    sigma = np.broadcast_to(sigma[:, None] if sigma.ndim == 1 else sigma, (len(pixels[0]), 2))
+    count = len(pixels[0])
+    if sigma.shape not in {(), (count,), (count, 2)}:
+        raise ShapeError(f"sigma_px is one number, ({count},) or ({count}, 2) for a and b; got {sigma.shape}")
+    sigma = np.broadcast_to(sigma[:, None] if sigma.ndim == 1 else sigma, (count, 2))
     if not (np.isfinite(sigma) & (sigma > 0.0)).all():
         raise NotFiniteError(
             "the standard deviation of a coordinate of a pixel, sigma_px, is a positive number"

@@ -20,9 +20,9 @@ from vision3d.two_view.selection import Criterion, choose_model
 
 __all__ = ["Readings", "read_pairs", "robust_sigma", "settled"]
 
-CHI2_MEDIAN = 0.4549364
-CLIPPINGS, WITHIN2, CLIPPED = 5, 9.0, 0.9733
-"""Of chi² with one degree of freedom: the mean below nine is a little less than one."""
+CHI2 = {1: (0.4549364, 9.0, 0.9733), 2: (1.3862944, 11.83, 0.9840)}
+"""Of chi² with one or two degrees of freedom: median, what 99.7 % are below, and their mean over all."""
+CLIPPINGS, HARDLY_MORE = 5, 1.2
 ROUNDS, FEWEST, AGAIN = 6, 6, 250
 WORTH = 0.5
 """Share of the pairs in space that a plane or a turn must hold to be worth a name."""
@@ -64,15 +64,32 @@ class Readings:
     stopped: str
 
 
-def robust_sigma(squared: Array, parameters: int) -> float:
-    """Noise of a coordinate, from squared distances of pairs that agree: root mean square within 3 sigmas."""
-    spare = len(squared) - parameters
-    if spare < 1:
-        return SIGMA_LEAST
-    variance = float(np.median(squared)) / CHI2_MEDIAN
+def robust_sigma(squared: Array, parameters: int, dims: int = 1) -> float:
+    """Noise of a coordinate, from squared distances of pairs that agree: root mean square within 3 sigmas.
+
+    `dims` is how many coordinates a distance has; infinite from too few pairs.
+    """
+    spare = len(squared) - parameters / dims
+    if spare < 1.0:
+        return np.inf
+    median, within, clipped = CHI2[dims]
+    variance = float(np.median(squared)) / median
     for _ in range(CLIPPINGS):
-        variance = float(np.mean(squared[squared <= WITHIN2 * variance])) / CLIPPED
+        variance = float(np.mean(squared[squared <= within * variance])) / (dims * clipped)
     return max(SIGMA_LEAST, float(np.sqrt(variance * len(squared) / spare)))
+
+
+def _common_sigma(squared: Array, flat: Array, turned: Array, threshold: float) -> float:
+    """The noise of the motion, or that of a simpler model which needs hardly more.
+
+    A motion's errors are across its lines only and follow what they can; where a turn or a plane leaves
+    nearly as little in both directions, that is the noise, and its tails are no parallax.
+    """
+    limit = threshold**2
+    least = robust_sigma(squared[squared < limit], 5)
+    simpler = (robust_sigma(flat[flat < 2.0 * limit], 8, 2), robust_sigma(turned[turned < 2.0 * limit], 3, 2))
+    near = [one for one in simpler if one < HARDLY_MORE * least]
+    return max([least, *near]) if np.isfinite(least) else SIGMA_LEAST
 
 
 def read_pairs(
@@ -106,7 +123,7 @@ def read_pairs(
     starts = [motion(one.R, one.t) for one in planes if np.linalg.norm(one.t) > 0.0]
     starts += [decompose_essential(found.model.reshape(3, 3))[0] for found in essentials]
     b_T_a, squared = _best_motion(rows, threshold, starts) if starts else (motion(R, AHEAD), never)
-    sigma = robust_sigma(squared[squared < threshold**2], 5)
+    sigma = _common_sigma(squared, flat, turned, threshold)
     told = [found for found in (*essentials, homography, rotation) if found is not None]
     distances = {"general": squared, "planar": flat, "pure rotation": turned}
     return Readings(

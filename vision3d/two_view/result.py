@@ -16,7 +16,7 @@ __all__ = ["TwoView", "Verdict", "nothing"]
 Verdict = Literal["general", "planar", "pure rotation", "too few", "no overlap", "identical"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TwoView:
     """The relative pose of two pictures, up to the length of its translation.
 
@@ -59,6 +59,14 @@ class TwoView:
     log10_nfa: float
     trials: int
     stopped: str
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in (
+            self.b_T_a, self.cov, self.essential, self.inliers, self.points_a, self.residuals, self.rivals,
+            self.normal,
+        ):  # fmt: skip
+            array.flags.writeable = False
 
     @property
     def known(self) -> bool:

@@ -56,6 +56,10 @@ def test_bad_pixels_are_told(rng):
     it = world(rng, count=20)
     with pytest.raises(ShapeError, match="matches are pixels"):
         estimate_two_view(PINHOLE, PINHOLE, it.pixels_a, it.pixels_b[:5])
+    with pytest.raises(ShapeError, match="sigma_px is one number"):
+        estimated(it, sigma_px=np.ones(7))
+    with pytest.raises(NotFiniteError, match="positive"):
+        estimated(it, sigma_px=-1.0)
     it.pixels_a[3] = np.nan
     with pytest.raises(NotFiniteError, match="finite"):
         estimated(it)
