@@ -29,6 +29,7 @@ from vision3d.two_view.result import Verdict
 __all__ = ["Told", "tell_motion", "tell_plane", "tell_turn"]
 
 FLAT, EITHER, FEWEST = 0.8, 0.6, 8
+BIAS_PX, BIAS_SIGMAS = 0.1, 5.0
 SURER = 5.0
 """How many pairs more must speak for one reading of a plane to rule out the other: some do by chance."""
 ROUNDS = 3
@@ -144,7 +145,7 @@ def tell_turn(readings: Readings, level: float | None) -> Told:
 def tell(readings: Readings, level: float | None) -> Told:
     """The story that Torr's criterion prefers, or the nearest that the pairs allow."""
     best = readings.criterion.best
-    if best != "pure rotation" and _without_parallax(readings):
+    if best != "pure rotation" and _without_parallax(readings, level):
         return tell_turn(readings, level)
     try:
         if readings.planes and (best == "planar" or (best == "general" and _open(readings))):
@@ -166,17 +167,20 @@ def _open(readings: Readings) -> bool:
     return all(_misfit(readings, motion(one.R, one.t)) < best + SURER for one in readings.planes)
 
 
-def _without_parallax(readings: Readings) -> bool:
+def _without_parallax(readings: Readings, level: float | None) -> bool:
     """Whether a turn explains most pairs, and what is left puts as many points behind the cameras as ahead.
 
     Tails of the noise are wider than Gaussian ones, and an essential matrix is happy to follow them; depths
-    from noise have either sign.
+    from noise have either sign.  Below a tenth of a pixel there are features' biases, whatever the sign.
     """
     limit = readings.threshold**2
     agree = readings.motion_squared < limit
     count = int(agree.sum())
     if count < FEWEST or not np.mean(readings.rotation_squared[agree] < 2.0 * limit) > FLAT:
         return False
+    floor = BIAS_PX if level is None else min(BIAS_PX, BIAS_SIGMAS * level)
+    if float(np.median(readings.rotation_squared[agree])) < floor**2:
+        return True
     rays = readings.rows[agree, :3], readings.rows[agree, 3:6]
     try:
         votes = recover_pose(essential_matrix(readings.motion), *rays).votes
