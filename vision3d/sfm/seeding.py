@@ -47,11 +47,9 @@ def verified_pairs(
         if len(rows) < LEAST:
             continue
         pixels_a, pixels_b = scene.pixels[a][rows[:, 0]], scene.pixels[b][rows[:, 1]]
-        # a reading that no pair supports has no finite criterion, and loses
-        with np.errstate(divide="ignore", invalid="ignore"):
-            view = estimate_two_view(
-                scene.camera(a), scene.camera(b), pixels_a, pixels_b, threshold_px=threshold_px
-            )
+        view = estimate_two_view(
+            scene.camera(a), scene.camera(b), pixels_a, pixels_b, threshold_px=threshold_px
+        )
         if view.verdict in MOVED and view.inliers.sum() >= LEAST:
             pairs.append(PairGeometry(a, b, rows[view.inliers], view))
     return pairs
