@@ -52,7 +52,7 @@ def costs(*, quick: bool) -> dict[str, Figure]:
         start = disturbed(truth, rng).replaced(models=("RADIAL", "RADIAL"))
         say(f"synthetic set {seed}: 8 images of 2 cameras, {len(start.pixels)} observations")
         shares += [share for loss in LOSSES for share in apart(start, loss)]
-    rows["bundle, synthetic: cost against COLMAP's, worst"] = within(shares)
+    rows["bundle_cost_over_colmap_synthetic"] = within(shares)
     folder = os.environ.get("FACTORLAB_DATA")
     if folder:
         rows |= real_costs(Path(folder) / "vision" / "balbianello")
@@ -70,7 +70,7 @@ def real_costs(folder: Path) -> dict[str, Figure]:
     start = disturbed(model, np.random.default_rng(1))
     say("Balbianello's Bundler file, disturbed, a camera for every image")
     rows = {
-        "bundle, Balbianello: cost against COLMAP's, worst": within(
+        "bundle_cost_over_colmap_bundler_file": within(
             [share for loss in LOSSES for share in apart(start, loss)]
         )
     }
@@ -79,7 +79,7 @@ def real_costs(folder: Path) -> dict[str, Figure]:
         say(f"{name}, intrinsics held")
         shares += apart(read_bal(folder / f"{name}.txt"), None, refine=False)
     rows |= photographs(folder)
-    rows["bundle, dubrovnik-3-7: cost against COLMAP's, worst"] = within(shares)
+    rows["bundle_cost_over_colmap_dubrovnik"] = within(shares)
     return rows
 
 
@@ -90,11 +90,11 @@ def photographs(folder: Path) -> dict[str, Figure]:
     start = disturbed(colmaps, np.random.default_rng(1))
     shares = [share for loss in LOSSES for share in apart(start, loss)]
     return {
-        "bundle, Balbianello's photographs: cost against COLMAP's, worst": within(shares),
-        "own mapper, Balbianello: pictures with a place": Figure(
+        "bundle_cost_over_colmap_balbianello": within(shares),
+        "own_mapper_balbianello_placed": Figure(
             len(own), "of 5", f"COLMAP {len(colmaps)}", must=5, aim=5, better="higher"
         ),
-        "own mapper, Balbianello: reprojection error": Figure(
+        "own_mapper_balbianello_error": Figure(
             own.mean_error_px, "px", f"{len(own.points)} points; COLMAP, {len(colmaps.points)}: "
             f"{colmaps.mean_error_px:.3f}", must=0.26, aim=0.255,
         ),
@@ -117,7 +117,7 @@ def honesty(*, quick: bool) -> dict[str, Figure]:
     for name in names:
         mean, spread = np.mean(told[name]), np.std(told[name]) / np.sqrt(sets)
         say(f"NEES/dof of {name}: {mean:.3f} ± {spread:.3f} over {sets} sets")
-        rows[f"bundle, NEES/dof of {name}: apart from 1"] = Figure(
+        rows[f"bundle_nees_off_one_{name}"] = Figure(
             abs(mean - 1.0), "", f"measured {mean:.3f} +- {spread:.3f}", must=0.3, aim=0.1
         )
     return rows
@@ -163,6 +163,8 @@ def times(*, quick: bool) -> dict[str, Figure]:
     took = {name: median(values[1:]) for name, values in seconds.items()}
     say(f"{len(start.pixels)} observations: " + ", ".join(f"{k} {v:.2f} s" for k, v in took.items()))
     return {
-        f"bundle, time of {name} / Ceres": Figure(took[name] / took["Ceres"], "x", "COLMAP's solve, 1 thread")
+        f"bundle_time_over_ceres_{name.lower()}": Figure(
+            took[name] / took["Ceres"], "x", "COLMAP's solve, 1 thread"
+        )
         for name in ("GTSAM", "compiled")
     }
