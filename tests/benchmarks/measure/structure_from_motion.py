@@ -66,16 +66,14 @@ def photographs() -> dict[str, Figure]:
             f"{len(found.pixels)} observations, f {focal:.1f} ± {sigma:.1f} px (Bundler {FOCAL_BUNDLER})"
         )
         rows |= {
-            f"Balbianello, {mapper}: pictures with a place": Figure(
+            f"balbianello_{mapper}_placed": Figure(
                 len(found), "of 5", f"COLMAP alone {len(alone)}", 5, 5, "higher"
             ),
-            f"Balbianello, {mapper}: reprojection error": Figure(
-                found.mean_error_px, "px", told, 0.26, 0.255
-            ),
-            f"Balbianello, {mapper}: our adjustment's cost against COLMAP's": Figure(
+            f"balbianello_{mapper}_error": Figure(found.mean_error_px, "px", told, 0.26, 0.255),
+            f"balbianello_{mapper}_cost_off_colmap": Figure(
                 100.0 * abs(result.cost / result.initial_cost - 1.0), "%", "COLMAP 4.2", 0.5, 0.5
             ),
-            f"Balbianello, {mapper}: focal length against Bundler's": Figure(
+            f"balbianello_{mapper}_focal_off_bundler": Figure(
                 100.0 * abs(focal / FOCAL_BUNDLER - 1.0), "%", "Bundler has a camera a picture"
             ),
         }
@@ -101,8 +99,6 @@ def truths(*, quick: bool) -> dict[str, Figure]:
     say("ATE over distance, ppm: " + ", ".join(f"{k} {1e6 * np.median(v):.0f}" for k, v in errors.items()))
     alone = f"COLMAP alone {1e6 * np.median(errors['COLMAP alone']):.0f} ppm"
     return {
-        f"rendered desks, {name}: ATE over distance": Figure(
-            1e6 * float(np.median(errors[name])), "ppm", alone, 500.0
-        )
+        f"rendered_desks_{name}_ate": Figure(1e6 * float(np.median(errors[name])), "ppm", alone, 500.0)
         for name in ("known", "calibrated", "global")
     }
