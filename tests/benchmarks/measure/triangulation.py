@@ -26,7 +26,7 @@ LENSES = {
 }
 ORBIT = orbit_poses((0, 0.1, 1.6), 1.6, 6, arc_rad=0.6)
 NAMES, FIRST_SEED = ("desk", "corridor", "wall", "ground"), 900
-SIZED = "rendered, noise sized by residuals"
+SIZED = "rendered_sized_by_residuals"
 
 
 def figures(*, quick: bool = False) -> dict[str, Figure]:
@@ -38,8 +38,8 @@ def band(name: str, values: list[float], said: str, *, judged: bool = True) -> d
     """The largest and the smallest of values that should be 1."""
     top, low = ((1.3, 1.1), (0.8, 0.9)) if judged else ((None, None), (None, None))
     return {
-        f"triangulation, {name}: NEES/3, largest": Figure(max(values), "", said, *top),
-        f"triangulation, {name}: NEES/3, smallest": Figure(min(values), "", said, *low, better="higher"),
+        f"triangulated_nees_{name}_largest": Figure(max(values), "", said, *top),
+        f"triangulated_nees_{name}_smallest": Figure(min(values), "", said, *low, better="higher"),
     }
 
 
@@ -58,13 +58,13 @@ def projected(*, quick: bool) -> dict[str, Figure]:
             nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(found.covs), error) / 3
             values.append(float(nees.mean()))
             say(f"  {name:<9} {views} views: NEES/3 {values[-1]:.3f}")
-    return band("projected truth", values, f"3 lenses, 2, 3, 6 views, {n} points each")
+    return band("projected", values, f"3 lenses, 2, 3, 6 views, {n} points each")
 
 
 def rendered(*, quick: bool) -> dict[str, Figure]:
     """Whole photographs; every scene several times, at the usual noise and at more."""
     sets, rows = 1 if quick else 3, {}
-    held: dict[str, list[np.ndarray]] = {"rendered": [], "rendered, away from edges": [], SIZED: []}
+    held: dict[str, list[np.ndarray]] = {"rendered": [], "rendered_away_from_edges": [], SIZED: []}
     for noise in (2.0, 5.0):
         for name in NAMES:
             pairs = [
@@ -83,10 +83,10 @@ def rendered(*, quick: bool) -> dict[str, Figure]:
     said = f"{sets} pairs each of {', '.join(NAMES)} at noise 2 and 5"
     for what, parts in held.items():
         whole = float(np.mean(np.concatenate(parts)))
-        rows |= band(f"{what}, mean", [whole], f"over all points; {said}", judged=what != SIZED)
+        rows |= band(f"{what}_mean", [whole], f"over all points; {said}", judged=what != SIZED)
         if what != SIZED:
             scenes = [float(values.mean()) for values in parts]
-            rows |= band(f"{what}, by scene", scenes, said, judged=False)
+            rows |= band(f"{what}_by_scene", scenes, said, judged=False)
     return rows
 
 
@@ -110,10 +110,8 @@ def equal() -> dict[str, Figure]:
     shown = np.stack([camera.project(transform(pose, best)) for pose in poses])
     ways = max(float(np.abs(np.stack(other) - np.stack(exact)).max()) for other in (quick, shown))
     return {
-        "triangulation, linear against cv2.triangulatePoints": Figure(apart, "m", "2000 points", 1e-9, 1e-12),
-        "triangulation, three ways to the optimum, furthest": Figure(
-            ways, "px", "Hartley-Sturm, Lindström, Gauss-Newton", 1e-4, 1e-6
-        ),
+        "triangulated_linear_off_opencv": Figure(apart, "m", "2000 points", 1e-9, 1e-12),
+        "triangulated_optima_apart": Figure(ways, "px", "Hartley-Sturm, Lindström, Gauss-Newton", 1e-4, 1e-6),
     }
 
 
@@ -134,6 +132,6 @@ def times(*, quick: bool) -> dict[str, Figure]:
     spent = interleaved({"ours": lambda: triangulate(camera, poses, pixels), "cv2": theirs}, 3)
     said = "undistortPoints and triangulatePoints: linear, no covariance"
     return {
-        "triangulation, optimal with covariance, time a point": Figure(1e6 * spent["ours"] / n, "µs", "–"),
-        "triangulation, time against OpenCV's linear": Figure(spent["ours"] / spent["cv2"], "x", said),
+        "triangulated_time_a_point": Figure(1e6 * spent["ours"] / n, "µs", "–"),
+        "triangulated_time_over_opencv_linear": Figure(spent["ours"] / spent["cv2"], "x", said),
     }
