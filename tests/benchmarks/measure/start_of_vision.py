@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 from statistics import median
-from time import perf_counter
 
 from measure.figures import Figure
 
@@ -17,13 +17,13 @@ EVERY_ROOM = (
 
 
 def figures(*, quick: bool = False) -> dict[str, Figure]:
-    """Seconds of an import beyond those of a bare interpreter with NumPy."""
+    """CPU seconds of imports beyond those of a bare interpreter."""
     rounds = 3 if quick else 9
     seconds = {"bare": [], "package": [], "rooms": []}
     for _ in range(rounds):
         for name, text in (("bare", "import numpy"), ("package", "import vision3d"), ("rooms", EVERY_ROOM)):
             seconds[name].append(of_a_start(WITHOUT_OPEN3D + text))
-    bare = of_a_start("pass")
+    bare = median(of_a_start("pass") for _ in range(rounds))
     return {
         "import_vision3d": Figure(max(median(seconds["package"]) - bare, 0.0), "s", "–", 0.3),
         "import_every_room_without_open3d": Figure(
@@ -33,7 +33,8 @@ def figures(*, quick: bool = False) -> dict[str, Figure]:
 
 
 def of_a_start(text: str) -> float:
-    """Wall-clock seconds of an interpreter that runs one line."""
-    began = perf_counter()
+    """CPU seconds of an interpreter that runs one line."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-c", text], check=True)
-    return perf_counter() - began
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
