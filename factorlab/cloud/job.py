@@ -156,9 +156,10 @@ def _described(points: Array) -> tuple[float, float]:
     from scipy.spatial import cKDTree
 
     some = points[:: max(1, len(points) // SAMPLE)]
-    spacing = float(np.median(cKDTree(points).query(some, 2, workers=-1)[0][:, 1]))
-    near = cKDTree(points).query(some, min(20, len(points)), workers=-1)[1]
+    distance, near = cKDTree(points).query(some, min(20, len(points)), workers=-1)
     around = points[near] - points[near].mean(axis=1, keepdims=True)
     values = np.linalg.eigvalsh(np.swapaxes(around, 1, 2) @ around)
     total = np.maximum(values.sum(axis=1), 1e-300)
-    return spacing, float(np.median(1.0 - 3.0 * np.maximum(values[:, 0], 0.0) / total))
+    return float(np.median(distance[:, 1])), float(
+        np.median(1.0 - 3.0 * np.maximum(values[:, 0], 0.0) / total)
+    )

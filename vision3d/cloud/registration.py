@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from sequential.errors import DataError, ModelError
 from sequential.manifold import SE3
-from sequential.manifold.quaternion import rotation_matrix
+from sequential.manifold.quaternion import quaternion_from_matrix, rotation_matrix
 from vision3d.cloud.arrays import Array, Backend, beside, checked_backend, checked_points, positive
 from vision3d.cloud.normals import estimate_normals
 from vision3d.cloud.with_open3d import open3d
@@ -201,8 +201,6 @@ def _step(residuals: Array, slopes: Array, weights: Array, scale: Array) -> tupl
 def _by_open3d(
     moving: Array, fixed: Array, planes: Array | None, pose: Array, limit: float, rounds: int
 ) -> IcpResult:
-    from scipy.spatial.transform import Rotation
-
     if not np.isfinite(limit):
         raise ModelError("max_distance_m: open3d needs one; give the largest distance that a pair may have")
     o3d = open3d()
@@ -216,7 +214,7 @@ def _by_open3d(
     matrix[:3, :3], matrix[:3, 3] = rotation_matrix(pose[:4]), pose[4:]
     criteria = registration.ICPConvergenceCriteria(1e-9, 1e-9, rounds)
     found = registration.registration_icp(*clouds, limit, matrix, way, criteria)
-    attitude = Rotation.from_matrix(found.transformation[:3, :3]).as_quat(scalar_first=True)
+    attitude = quaternion_from_matrix(found.transformation[:3, :3])
     answer = np.concatenate([attitude, found.transformation[:3, 3]])
     overlap, rmse = float(found.fitness), float(found.inlier_rmse)
     return IcpResult(answer, None, rmse, overlap, rounds, overlap > 0.0, "open3d's", np.empty((0, 6)))

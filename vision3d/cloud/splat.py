@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import ModelError
+from sequential.manifold.quaternion import quaternion_from_matrix
 from vision3d.camera import Camera
 from vision3d.cloud.arrays import Array, beside, checked_points
 from vision3d.rigid import transform
@@ -128,8 +129,6 @@ def viewpoint(
     tuple
         camera, and camera_T_world (7,).
     """
-    from scipy.spatial.transform import Rotation
-
     place = checked_points(points, at_least=1)
     z = np.asarray(forward, dtype=np.float64)
     x = np.cross(np.asarray(down, dtype=np.float64), z)
@@ -146,5 +145,4 @@ def viewpoint(
     away = 1.08 * focal * max(half[0] / (width / 2.0), half[1] / (height / 2.0))
     camera = Camera("pinhole", (focal, focal, (width - 1) / 2.0, (height - 1) / 2.0), (), size)
     moved = np.array([-centre[0], -centre[1], away + half[2] - centre[2]])
-    attitude = Rotation.from_matrix(camera_R_world).as_quat(scalar_first=True)
-    return camera, np.concatenate([attitude, moved])
+    return camera, np.concatenate([quaternion_from_matrix(camera_R_world), moved])

@@ -211,7 +211,6 @@ def test_a_truth_of_another_size(folder):
 
 
 def test_the_motorcycle_of_scikit_image():
-    pytest.importorskip("skimage")
     told = run("--demo", "--json", "--check")
     assert told.exit_code == 0, told.stderr
     document = json.loads(told.stdout)

@@ -45,7 +45,6 @@ def test_points_project_onto_their_pixels(camera, rng):
 
 
 def test_open3d_gives_the_same_points(rng):
-    pytest.importorskip("open3d")
     z = rng.uniform(0.5, 5.0, (240, 320)).astype(np.float32)
     z[10:20] = 0.0
     ours, theirs = back_project(z, CAMERA), back_project(z, CAMERA, backend="open3d")
