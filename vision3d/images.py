@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError, FileFormatError
 
-__all__ = ["ImageSet", "LeftOut", "image_paths", "read_image", "read_images"]
+__all__ = ["ImageSet", "LeftOut", "image_paths", "png_bytes", "read_image", "read_images"]
 
 Image = NDArray[np.uint8]
 OPAQUE = 255
@@ -265,3 +265,10 @@ def _copy_of(name: str, image: Image, kept: dict[bytes, str]) -> str:
 
     first = kept.setdefault(blake2b(image.tobytes(), digest_size=16).digest(), name)
     return "" if first == name else f"is the same picture as {first}, whose corners would count twice"
+
+
+def png_bytes(image: NDArray[Any]) -> bytes:
+    """A picture of 8 or 16 bits, grey or BGR, as the content of a PNG file."""
+    import cv2
+
+    return bytes(cv2.imencode(".png", image)[1])

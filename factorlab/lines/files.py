@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from factorlab.lines.job import LineRun, Read
 from factorlab.lines.numbers import COLUMNS, row_of
+from vision3d.images import png_bytes
 from vision3d.lines import GroundHomography, draw_lane, draw_line, draw_segments
 
 __all__ = ["bird_eye", "drawn", "line_files"]
@@ -25,11 +26,11 @@ def line_files(run: LineRun) -> dict[str, str | bytes]:
     files: dict[str, str | bytes] = {"frames.csv": frames_csv(run)}
     if run.is_picture:
         image, read = run.pictures[0], run.reads[0]
-        files["line.png"] = _png(drawn(image, read))
+        files["line.png"] = png_bytes(drawn(image, read))
         if run.scene is not None and not read.line.found:
-            files["segments.png"] = _png(draw_segments(image, run.scene.segments, run.scene.points))
+            files["segments.png"] = png_bytes(draw_segments(image, run.scene.segments, run.scene.points))
         if run.ground is not None:
-            files["ground.png"] = _png(bird_eye(run.ground, drawn(image, read), run.job.settings.middle))
+            files["ground.png"] = png_bytes(bird_eye(run.ground, drawn(image, read), run.job.settings.middle))
     return files
 
 
@@ -71,9 +72,3 @@ def bird_eye(ground: GroundHomography, image: Picture, middle: float = 0.5) -> P
     side = min(float(np.abs(xy[:, 1]).max()), far)
     scale = TALL / (far - near)
     return ground.bird_eye(image, x_m=(near, far), y_m=(-side, side), px_per_m=min(scale, 2 * TALL / side))
-
-
-def _png(image: Picture) -> bytes:
-    import cv2
-
-    return bytes(cv2.imencode(".png", image)[1])

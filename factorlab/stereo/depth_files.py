@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.stereo.depth_job import DepthRun
+from vision3d.images import png_bytes
 
 __all__ = ["depth_files"]
 
@@ -30,11 +31,11 @@ def depth_files(run: DepthRun) -> dict[str, str | bytes]:
             map_px=found.map_px, std_px=found.std_px, valid=found.valid, occluded=found.occluded,
             confidence=found.confidence, range_px=np.array(found.range_px),
         ),
-        "disparity.png": _png(_fixed(found.map_px * DISPARITY_STEPS)),
-        "mask.png": _png(mask_picture(run)),
+        "disparity.png": png_bytes(_fixed(found.map_px * DISPARITY_STEPS)),
+        "mask.png": png_bytes(mask_picture(run)),
     }  # fmt: skip
     if run.geometry is not None and run.geometry.rectification is not None:
-        files |= {"rectified_left.png": _png(run.left), "rectified_right.png": _png(run.right)}
+        files |= {"rectified_left.png": png_bytes(run.left), "rectified_right.png": png_bytes(run.right)}
     if run.depth is not None and run.geometry is not None:
         more: dict[str, Any] = {}
         if run.depth.systematic_m is not None:
@@ -44,7 +45,9 @@ def depth_files(run: DepthRun) -> dict[str, str | bytes]:
             intrinsics=run.geometry.camera.intrinsics, baseline_m=np.array(run.geometry.baseline_m),
             doffs_px=np.array(run.geometry.doffs_px), **more,
         )  # fmt: skip
-        files["depth.png"] = _png(_fixed(np.where(run.depth.z_m <= DEEPEST_M, 1e3 * run.depth.z_m, np.nan)))
+        files["depth.png"] = png_bytes(
+            _fixed(np.where(run.depth.z_m <= DEEPEST_M, 1e3 * run.depth.z_m, np.nan))
+        )
     if run.cloud is not None and len(run.cloud):
         files["cloud.ply"] = _ply(run)
     return files
@@ -63,12 +66,6 @@ def _fixed(values: Any) -> NDArray[np.uint16]:
     with np.errstate(invalid="ignore"):
         held = np.where(np.isfinite(values) & (values > 0.0), np.rint(values), 0.0)
     return np.clip(held, 0, 65535).astype(np.uint16)
-
-
-def _png(image: NDArray[Any]) -> bytes:
-    import cv2
-
-    return bytes(cv2.imencode(".png", image)[1])
 
 
 def _npz(**arrays: Any) -> bytes:
