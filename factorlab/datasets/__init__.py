@@ -17,9 +17,10 @@ from factorlab.datasets.kitti import load_kitti
 from factorlab.datasets.mrclam import load_mrclam
 from factorlab.datasets.plaza import load_plaza
 from factorlab.datasets.rail import load_rail
+from factorlab.datasets.slam import SlamDataset
 from sequential.errors import DataError
 
-__all__ = ["NAMES", "Dataset", "Truth", "load"]
+__all__ = ["NAMES", "SLAM_NAMES", "Dataset", "SlamDataset", "Truth", "load", "load_slam"]
 
 _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
     "kitti": lambda use_every, data, _robot: [load_kitti(use_every, data)],
@@ -29,6 +30,9 @@ _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
     "rail": lambda _use_every, data, _robot: [load_rail(data)],
 }
 NAMES = tuple(_LOADERS)
+
+_SLAM_LOADERS: dict[str, Callable[[Path | None, int | None], list[SlamDataset]]] = {}
+SLAM_NAMES = tuple(_SLAM_LOADERS)
 
 
 def load(
@@ -49,9 +53,31 @@ def load(
     DataError
         for an unknown name or missing files; the message says where they come from.
     """
-    if name not in _LOADERS:
-        near = get_close_matches(name, NAMES, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        msg = f"there is no dataset {name!r}, only {', '.join(NAMES)}{hint}"
-        raise DataError(msg)
+    _require_known(name, NAMES)
     return _LOADERS[name](use_every, None if data is None else Path(data), robot)
+
+
+def load_slam(name: str, *, data: str | Path | None = None, robot: int | None = None) -> list[SlamDataset]:
+    """Load a SLAM problem by its name; one `SlamDataset` for each vehicle in it.
+
+    Parameters
+    ----------
+    name : one of `SLAM_NAMES`
+    data : folder of the files, where it is not the usual one
+    robot : only this vehicle, where the recording has several
+
+    Raises
+    ------
+    DataError
+        for an unknown name or missing files; the message says where they come from.
+    """
+    _require_known(name, SLAM_NAMES)
+    return _SLAM_LOADERS[name](None if data is None else Path(data), robot)
+
+
+def _require_known(name: str, names: tuple[str, ...]) -> None:
+    if name not in names:
+        near = get_close_matches(name, names, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        msg = f"there is no dataset {name!r}, only {', '.join(names)}{hint}"
+        raise DataError(msg)
