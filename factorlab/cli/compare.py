@@ -47,6 +47,7 @@ class Settings:
     force: bool = False
     seed: int = 0
     check: bool = False
+    slam: bool = False
 
 
 @click.command(short_help="Estimators side by side on one log.")
@@ -71,6 +72,7 @@ class Settings:
     help="For a log of your own: where it really was.",
 )
 @robot_option
+@click.option("--slam", is_flag=True, help="Do not use the map: estimate it (mrclam, starry_night).")
 @max_gap_option
 @as_json
 @click.option(
@@ -85,9 +87,15 @@ def compare(**options: Any) -> int:
     """Run several estimators on one log and put them in one table.
 
     DATASET is kitti, plaza1, plaza2, mrclam or rail; LOG is a CSV or NPZ file with named streams, together
-    with --model.  `factorlab info LOG` shows what a log holds.
+    with --model, or a pose graph in g2o or TORO format.  `factorlab info LOG` shows what a log holds.
+
+    Problems with unknown landmarks or loop closures: victoria_park, sphere2500, w10000, city10000, intel,
+    mit, planar_monocular, and mrclam or starry_night with --slam.
     """
-    return compare_and_show(Settings(**options))
+    settings = Settings(**options)
+    from factorlab.cli.compare_slam import compare_slam_and_show, is_slam
+
+    return compare_slam_and_show(settings) if is_slam(settings) else compare_and_show(settings)
 
 
 def compare_and_show(settings: Settings) -> int:

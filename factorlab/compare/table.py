@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any
+from typing import Any, Protocol
 
 from factorlab.compare.accuracy import Errors
 from factorlab.compare.estimators import KINDS
@@ -133,7 +133,20 @@ class Comparison:
         return plain | {"notes": list(self.dataset.notes), "readings": self.readings, "seed": self.seed}
 
 
-def document(comparisons: tuple[Comparison, ...], command: str) -> dict[str, Any]:
+class Told(Protocol):
+    """What a document is made of: a comparison of chains or of SLAM problems."""
+
+    @property
+    def name(self) -> str:
+        """Of the recording."""
+        ...
+
+    def to_json(self) -> dict[str, Any]:
+        """Without versions and command."""
+        ...
+
+
+def document(comparisons: Sequence[Told], command: str) -> dict[str, Any]:
     """One JSON document for one comparison, or `{"runs": {name: …}}` for several; NaN becomes null."""
     whole: dict[str, Any] = {"schema": SCHEMA}
     if len(comparisons) == 1:

@@ -1,0 +1,116 @@
+"""`factorlab compare` for problems with unknown landmarks, loop closures and graph files."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from factorlab.cli.faults import CHECK_FAILED, DATA_ERROR
+from factorlab.cli.settings import command_line, print_json
+
+if TYPE_CHECKING:
+    from factorlab.cli.compare import Settings
+    from factorlab.datasets import SlamDataset
+    from factorlab.slam import SlamComparison
+
+__all__ = ["compare_slam_and_show", "is_slam"]
+
+GRAPH_FILES = {".g2o", ".graph", ".toro"}
+CHAIN_ONLY = ("model", "truth", "use_every", "max_gap")
+
+
+def is_slam(settings: Settings) -> bool:
+    """Whether a source is a SLAM problem: asked for, one by its name, or a graph file."""
+    from factorlab.datasets import NAMES, SLAM_NAMES
+
+    named = settings.source in SLAM_NAMES and settings.source not in NAMES
+    return settings.slam or named or Path(settings.source).suffix in GRAPH_FILES
+
+
+def compare_slam_and_show(settings: Settings) -> int:
+    """Compare, write, print; returns the exit code."""
+    from factorlab.compare.table import document
+    from factorlab.report.folder import require_free
+    from factorlab.slam import compare_slam
+
+    names = _names(settings.estimators)
+    if settings.tune:
+        raise click.UsageError("--tune fits the noise of a chain; a SLAM problem keeps the noise it states")
+    for name in CHAIN_ONLY:
+        if getattr(settings, name) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise click.UsageError(f"{option} goes with a log and a model, not with a SLAM problem")
+    if settings.out is not None:
+        require_free(settings.out, force=settings.force)
+    done = []
+    for dataset in _datasets(settings):
+        with _progress(dataset.name) as progress:
+            done.append(compare_slam(dataset, names, seed=settings.seed, progress=progress))
+    comparisons = tuple(done)
+    if all(comparison.all_failed for comparison in comparisons):
+        reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)
+        click.echo(f"error: no estimator succeeded: {'; '.join(reasons)}", err=True)
+        return DATA_ERROR
+    whole = document(comparisons, command_line())
+    _print(comparisons, whole, as_json=settings.as_json)
+    if settings.out is not None:
+        from factorlab.report.slam_writing import write_slam_report
+
+        page = write_slam_report(comparisons, whole, settings.out, force=settings.force)
+        click.echo(f"report: {page}", err=settings.as_json)
+    failed = any(finding.status == "FAIL" for one in comparisons for finding in one.findings)
+    return CHECK_FAILED if settings.check and failed else 0
+
+
+def _names(given: str | None) -> tuple[str, ...] | None:
+    """Names of estimators; a wrong one is a usage error."""
+    if given is None:
+        return None
+    from factorlab.compare.estimators import UnknownEstimatorError
+    from factorlab.slam.estimators import require_names
+
+    try:
+        return require_names(tuple(name.strip() for name in given.split(",") if name.strip()))
+    except UnknownEstimatorError as error:
+        raise click.BadParameter(str(error), param_hint="--estimators") from error
+
+
+def _datasets(settings: Settings) -> list[SlamDataset]:
+    """The named problem, or the user's own graph file."""
+    from factorlab.datasets import SLAM_NAMES, load_slam
+
+    if settings.source in SLAM_NAMES:
+        return load_slam(settings.source, robot=settings.robot)
+    if settings.robot is not None:
+        raise click.UsageError("--robot goes with a dataset that has several")
+    path = Path(settings.source)
+    if path.suffix in GRAPH_FILES or path.is_file():
+        from factorlab.datasets.pose_graphs import load_graph_file
+
+        return [load_graph_file(path)]
+    raise click.UsageError(
+        f"{settings.source} is no SLAM problem; there are {', '.join(SLAM_NAMES)}, and graph files "
+        f"of your own ({', '.join(sorted(GRAPH_FILES))})"
+    )
+
+
+def _progress(name: str) -> Any:
+    from factorlab.cli.progress import bar
+
+    return bar(name, shown=sys.stderr.isatty())
+
+
+def _print(comparisons: tuple[SlamComparison, ...], whole: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        print_json(whole)
+        return
+    from factorlab.cli.compare import coloured
+    from factorlab.slam.text import terminal
+
+    for comparison in comparisons:
+        for line in terminal(comparison):
+            click.echo(coloured(line))
+        click.echo()

@@ -1,0 +1,84 @@
+"""The estimators of SLAM problems by the names that tables, JSON and the command line use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any, Literal, NamedTuple, Protocol
+
+from factorlab.compare.estimators import UnknownEstimatorError
+from sequential.slam import SlamProblem, SlamRun
+
+__all__ = ["KINDS", "NAMES", "Kind", "SlamEstimator", "make", "require_names"]
+
+LAG_STEPS = 20
+
+
+class SlamEstimator(Protocol):
+    """Anything that solves a `SlamProblem`."""
+
+    def solve(self, problem: SlamProblem) -> SlamRun:
+        """Values, covariances and a report."""
+        ...
+
+
+class Kind(NamedTuple):
+    """What a row says about its estimator.
+
+    `solves` names the pass that gives the row: iSAM2's online and final rows come from one.
+    """
+
+    title: str
+    solves: str
+    part: Literal["online", "final"]
+    latency: str  # which later readings an estimate waits for
+
+
+KINDS = {
+    "ekf_slam": Kind("EKF-SLAM", "ekf_slam", "online", "none"),
+    "fixed_lag": Kind("fixed lag, online", "fixed_lag", "online", "none"),
+    "isam2": Kind("iSAM2, online", "isam2", "online", "none"),
+    "isam2_final": Kind("iSAM2, at the end", "isam2", "final", "whole log"),
+    "batch": Kind("batch graph", "batch", "final", "whole log"),
+    "batch_robust": Kind("batch graph, Cauchy loss", "batch_robust", "final", "whole log"),
+    "gnc": Kind("batch graph, GNC", "gnc", "final", "whole log"),
+}
+NAMES = tuple(KINDS)
+
+
+def require_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names, once each.
+
+    Raises
+    ------
+    UnknownEstimatorError
+        for a name that no estimator of SLAM problems has.
+    """
+    for name in names:
+        if name not in KINDS:
+            near = get_close_matches(name, NAMES, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(NAMES)}"
+            msg = f"no estimator of SLAM problems is called {name!r}; {hint}"
+            raise UnknownEstimatorError(msg)
+    if not names:
+        msg = f"a comparison needs an estimator; there are {', '.join(NAMES)}"
+        raise UnknownEstimatorError(msg)
+    return tuple(dict.fromkeys(names))
+
+
+def make(name: str, options: Mapping[str, Any], lag: float = LAG_STEPS) -> SlamEstimator:
+    """The estimator behind a pass; `options` are a dataset's for its graphs, `lag` is counted in steps."""
+    if name == "ekf_slam":
+        from sequential.slam import EkfSlam
+
+        return EkfSlam()
+    from factorlab.graph.slam import BatchSlam, FixedLagSlam, GncSlam, IncrementalSlam
+    from sequential.model import Loss
+
+    if name == "fixed_lag":
+        return FixedLagSlam(lag=lag)
+    if name == "isam2":
+        return IncrementalSlam()
+    if name == "gnc":
+        return GncSlam(**options)
+    return BatchSlam(**options, loss=Loss("cauchy", 2.385) if name == "batch_robust" else None)
