@@ -16,6 +16,7 @@ from sequential.slam.models import (
     LandmarkRangeBearing,
     MarkerCorners,
     OfSensor,
+    PlanarProjection,
     Prior,
     Projection,
     StereoProjection,
@@ -60,6 +61,18 @@ def in_view(rng, count, mount=None, depth=(2.0, 6.0)):
     return pose, pose[:, 4:] + sq.manifold.rotate(pose[:, :4], point)
 
 
+def on_floor(rng, count):
+    """Robots anywhere on the floor and points that their mounted cameras see."""
+    pose = SE2().random(rng, 2.0, (count,))
+    upright = np.zeros((count, 7))
+    upright[:, 0], upright[:, 3] = np.cos(pose[:, 2] / 2), np.sin(pose[:, 2] / 2)
+    upright[:, 4:6] = pose[:, :2]
+    z = rng.uniform(2.0, 6.0, count)
+    seen = np.stack([rng.uniform(-0.3, 0.3, count) * z, rng.uniform(-0.2, 0.2, count) * z, z], axis=-1)
+    body = MOUNT[4:] + sq.manifold.rotate(MOUNT[:4], seen)
+    return pose, upright[:, 4:] + sq.manifold.rotate(upright[:, :4], body)
+
+
 def markers_in_view(rng, count, mount=None):
     """Bodies anywhere and markers that face them, more or less."""
     pose, place = in_view(rng, count, mount, depth=(0.8, 2.0))
@@ -92,6 +105,8 @@ FACTORS = [
     Member("projection, mounted", Projection(PINHOLE, MOUNT), mounted(in_view)),
     Member("projection, brown4", Projection(BENT), in_view),
     Member("projection, fisheye4", Projection(FISHEYE, MOUNT), mounted(in_view)),
+    Member("projection on the floor", PlanarProjection(PINHOLE, MOUNT), on_floor),
+    Member("projection on the floor, brown4", PlanarProjection(BENT, MOUNT), on_floor),
     Member("stereo", StereoProjection((500.0, 480.0, 320.0, 240.0), 0.12), in_view, (1,)),
     Member(
         "stereo, mounted",

@@ -2,6 +2,7 @@
 
 from sequential.slam.models.displacement import Displacement
 from sequential.slam.models.marker import MarkerCorners
+from sequential.slam.models.planar_projection import PlanarProjection
 from sequential.slam.models.projection import Projection, StereoProjection
 from sequential.slam.models.ranging import LandmarkBearing, LandmarkRange, LandmarkRangeBearing
 from sequential.slam.models.relative import Between, Prior
@@ -15,6 +16,7 @@ __all__ = [
     "LandmarkRangeBearing",
     "MarkerCorners",
     "OfSensor",
+    "PlanarProjection",
     "Prior",
     "Projection",
     "StereoProjection",
