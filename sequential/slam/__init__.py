@@ -5,8 +5,20 @@ poses, calibrations), and measurements that join a few of them each.  `sequentia
 GTSAM: the declaration, the models with their Jacobians, and the filter; `factorlab.graph` solves the rest.
 """
 
+from sequential.slam.association import Association, with_associations
+from sequential.slam.ekf import EkfSlam
 from sequential.slam.estimate import SlamRun, Values
 from sequential.slam.factor_model import FactorModel, check_factor_model
 from sequential.slam.problem import Factors, SlamProblem
 
-__all__ = ["FactorModel", "Factors", "SlamProblem", "SlamRun", "Values", "check_factor_model"]
+__all__ = [
+    "Association",
+    "EkfSlam",
+    "FactorModel",
+    "Factors",
+    "SlamProblem",
+    "SlamRun",
+    "Values",
+    "check_factor_model",
+    "with_associations",
+]
