@@ -1,0 +1,223 @@
+"""The order in which measurements arrive, and where each variable is begun.
+
+`arrivals` lists the measurements step by step.  `begin` chooses for every variable the first measurement that
+determines it, and `placed` follows these choices: chains of relative poses by pointer jumping, so that ten
+thousand poses take a dozen vectorised rounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sequential.errors import ModelError, UnderConstrainedError
+from sequential.manifold import Array
+from sequential.slam.estimate import Values
+from sequential.slam.models.groups import compose, inverse
+from sequential.slam.models.relative import Between
+from sequential.slam.problem import Factors, SlamProblem
+
+__all__ = ["Beginning", "arrivals", "placed", "who"]
+
+Ints = NDArray[np.int64]
+Variable = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """How a variable is begun: by which measurement, as which of its slots."""
+
+    group: int
+    row: int
+    slot: int
+
+
+def who(group: Factors) -> str:
+    """What a message calls a group."""
+    return group.name or type(group.model).__name__
+
+
+def arrivals(problem: SlamProblem) -> tuple[Ints, Ints, Ints]:
+    """Step, group and row of every measurement, in the order of steps, groups and rows; (M,) each."""
+    steps = np.concatenate([np.zeros(0, dtype=np.int64), *problem.steps])
+    groups = np.repeat(np.arange(len(problem.factors)), [len(group) for group in problem.factors])
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(len(g)) for g in problem.factors)])
+    order = np.lexsort((rows, groups, steps))
+    return steps[order], groups[order], rows[order]
+
+
+def able(group: Factors, slot: int) -> bool:
+    """Whether the model of a group can place that slot at all."""
+    row = np.zeros((1, group.model.measured.size))
+    row[:] = np.asarray(group.z)[:1]
+    known = [None if k == slot else m.identity()[None] for k, m in enumerate(group.model.manifolds)]
+    try:
+        group.model.place(slot, row, *known)
+    except ModelError:
+        return False
+    return True
+
+
+def placed(problem: SlamProblem) -> Values:
+    """Values of all variables: those of `problem.start`, others by the first measurement that places them.
+
+    Raises
+    ------
+    UnderConstrainedError
+        naming a variable that no single measurement determines.
+    """
+    begun = _beginnings(problem)
+    index = {kind: problem.indices(kind) for kind in problem.kinds}
+    rows = {kind: np.full((len(index[kind]), problem.kinds[kind].size), np.nan) for kind in problem.kinds}
+    if problem.start is not None:
+        for kind, known in index.items():
+            has = problem.start.has(kind, known)
+            rows[kind][has] = problem.start.at(kind, known[has])
+    _follow(problem, index, rows, begun)
+    for kind in index:
+        rows[kind] = problem.kinds[kind].normalize(rows[kind]) if len(rows[kind]) else rows[kind]
+    return Values(index, rows)
+
+
+def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning]:
+    """How each variable without a start is begun, in the order in which that happens."""
+    known: set[Variable] = set()
+    if problem.start is not None:
+        known = {(kind, i) for kind, index in problem.start.index.items() for i in index.tolist()}
+    columns = [np.asarray(group.index).tolist() for group in problem.factors]
+    capable = [
+        {k for k in range(len(group.slots)) if len(group) and k != group.unknown and able(group, k)}
+        for group in problem.factors
+    ]
+    begun: dict[Variable, Beginning] = {}
+    waiting: list[tuple[int, int]] = []
+    _, groups, rows = arrivals(problem)
+    order = list(zip(groups.tolist(), rows.tolist(), strict=True))
+    while order:
+        count, waiting = len(begun), []
+        for g, row in order:
+            group = problem.factors[g]
+            missing = [
+                (k, (slot, i))
+                for k, (slot, i) in enumerate(zip(group.slots, columns[g][row], strict=True))
+                if k != group.unknown and (slot, i) not in known
+            ]
+            if len(missing) == 1 and missing[0][0] in capable[g] and group.unknown is None:
+                slot, variable = missing[0]
+                begun[variable] = Beginning(g, row, slot)
+                known.add(variable)
+            elif missing:
+                waiting.append((g, row))
+        if len(begun) == count:
+            break
+        order = waiting
+    _require_all(problem, known)
+    return begun
+
+
+def _require_all(problem: SlamProblem, known: set[Variable]) -> None:
+    for kind in problem.kinds:
+        for i in problem.indices(kind).tolist():
+            if (kind, i) in known:
+                continue
+            readers = sorted({who(g) for g in problem.factors if kind in g.slots})
+            msg = (
+                f"no single measurement says where {kind}{i} is to begin: its kind is named by "
+                f"{', '.join(readers)}, but from variables that are not known, or without determining it; "
+                "give it a value in problem.start, or add a prior"
+            )
+            raise UnderConstrainedError(msg)
+
+
+def _follow(
+    problem: SlamProblem, index: dict[str, Ints], rows: dict[str, Array], begun: dict[Variable, Beginning]
+) -> None:
+    """Fill rows by the beginnings: relative poses by pointer jumping, all others in vectorised rounds."""
+    links: dict[str, list[tuple[int, int, int, int, int]]] = {kind: [] for kind in index}
+    others: list[tuple[str, int, Beginning]] = []
+    place = {kind: {i: n for n, i in enumerate(known.tolist())} for kind, known in index.items()}
+    for (kind, i), beginning in begun.items():
+        group = problem.factors[beginning.group]
+        if isinstance(group.model, Between) and len(set(group.slots)) == 1:
+            ends = np.asarray(group.index)[beginning.row]
+            parent = place[kind][int(ends[1 - beginning.slot])]
+            links[kind].append((place[kind][i], parent, beginning.group, beginning.row, beginning.slot))
+        else:
+            others.append((kind, i, beginning))
+    chains = {kind: _Chain(problem, kind, found) for kind, found in links.items() if found}
+    while True:
+        for kind, chain in chains.items():
+            chain.carry(rows[kind])
+        if not others:
+            break
+        others = _round(problem, place, rows, others)
+
+
+class _Chain:
+    """Variables of one kind that are begun by relative poses: a forest, each node with its parent."""
+
+    def __init__(self, problem: SlamProblem, kind: str, links: list[tuple[int, int, int, int, int]]) -> None:
+        self.manifold = problem.kinds[kind]
+        table = np.array(links)
+        self.nodes, parent = table[:, 0], table[:, 1]
+        count = int(table[:, :2].max()) + 1
+        self.root = np.arange(count)
+        self.relative = np.tile(self.manifold.identity(), (count, 1))
+        self.root[self.nodes] = parent
+        for g in np.unique(table[:, 2]):
+            for slot in (0, 1):
+                here = table[(table[:, 2] == g) & (table[:, 4] == slot)]
+                z = np.asarray(problem.factors[g].z)[here[:, 3]]
+                self.relative[here[:, 0]] = z if slot == 1 else inverse(self.manifold, z)
+        while (above := self.root[self.root]).tolist() != self.root.tolist():
+            self.relative = compose(self.manifold, self.relative[self.root], self.relative)
+            self.root = above
+
+    def carry(self, rows: Array) -> None:
+        """Fill every node whose root is known."""
+        roots = rows[self.root[self.nodes]]
+        ready = np.isfinite(roots).all(axis=1) & ~np.isfinite(rows[self.nodes]).all(axis=1)
+        here = self.nodes[ready]
+        if len(here):
+            rows[here] = compose(self.manifold, roots[ready], self.relative[here])
+
+
+def _round(
+    problem: SlamProblem,
+    place: dict[str, dict[int, int]],
+    rows: dict[str, Array],
+    others: list[tuple[str, int, Beginning]],
+) -> list[tuple[str, int, Beginning]]:
+    """Place whatever has all its neighbours, one call for each group and slot; returns what still waits."""
+    batches: dict[tuple[int, int], list[tuple[str, int, Beginning]]] = {}
+    for item in others:
+        batches.setdefault((item[2].group, item[2].slot), []).append(item)
+    waiting: list[tuple[str, int, Beginning]] = []
+    for (g, missing), items in batches.items():
+        group = problem.factors[g]
+        which = np.array([item[2].row for item in items])
+        index = np.asarray(group.index)[which]
+        values: list[Array | None] = [
+            None if k == missing else rows[slot][[place[slot][i] for i in index[:, k].tolist()]]
+            for k, slot in enumerate(group.slots)
+        ]
+        known = [value for value in values if value is not None]
+        ready = np.ones(len(items), dtype=bool)
+        for value in known:
+            ready &= np.isfinite(value).all(axis=1)
+        if ready.any():
+            found = group.model.place(
+                missing,
+                np.asarray(group.z)[which[ready]],
+                *(None if value is None else value[ready] for value in values),
+            )
+            slot = group.slots[missing]
+            rows[slot][[place[slot][i] for i in index[ready, missing].tolist()]] = found
+        waiting += [item for item, is_ready in zip(items, ready.tolist(), strict=True) if not is_ready]
+    if len(waiting) == len(others):
+        kind, i, _ = waiting[0]
+        msg = f"{kind}{i} could not be placed: the variables it is measured from are unknown"
+        raise UnderConstrainedError(msg)
+    return waiting
