@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from numpy.typing import ArrayLike
 
 from sequential.errors import ModelError
 from sequential.manifold import Manifold, NavState, Product, Vector
 from sequential.model import Functions, ProcessModel, as_params
+from sequential.models.parts import walk_variances
 from sequential.models.rotation import HELPERS as ROTATIONS
 from sequential.models.rotation import quaternion_exp, quaternion_product, right_jacobian, rotation
 from sequential.noise import ImuNoise
@@ -28,6 +32,8 @@ class Strapdown(ProcessModel):
     ----------
     noise : densities of the sensor
     gravity : world-frame gravity, m/s²; z up unless you say otherwise
+    walks : of further parts of the state (a barometer's bias, a scale), by name: random walk, unit/√s;
+        parts without one stand still
 
     Notes
     -----
@@ -38,6 +44,7 @@ class Strapdown(ProcessModel):
 
     noise: ImuNoise
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    walks: Mapping[str, ArrayLike] | None = None
 
     def functions(self, manifold: Manifold) -> Functions:
         """Lowered: see `ProcessModel.functions`."""
@@ -48,14 +55,15 @@ class Strapdown(ProcessModel):
         n = self.noise
         sigmas = (n.accel_density, n.gyro_density, n.accel_bias_walk, n.gyro_bias_walk, n.integration_density)
         variances = [s * s for s in sigmas]
-        params = as_params(manifold.size, manifold.dim, self.gravity, variances)
+        others = walk_variances(manifold, self.walks, 15, "Strapdown")
+        params = as_params(manifold.size, manifold.dim, self.gravity, variances, others)
         if manifold.dim == 15:
             return Functions(step, jacobian, params, 6, noise, advance, carry, HELPERS)
         return Functions(step, jacobian, params, 6, noise, helpers=HELPERS)
 
 
 def step(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
-    """One sample; p = [n, d, gravity (3), variances (5)]."""
+    """One sample; p = [n, d, gravity (3), variances (5), walks (d)]."""
     for i in range(10, int(p[0])):
         out[i] = x[i]
     a, b, c = u[0] - x[10], u[1] - x[11], u[2] - x[12]
@@ -113,6 +121,8 @@ def noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
         out[speed * d + speed] += dt * p[5]
         out[(9 + i) * d + 9 + i] += dt * p[7]
         out[(12 + i) * d + 12 + i] += dt * p[8]
+    for i in range(15, d):
+        out[i * d + i] += dt * p[10 + i]
 
 
 def push(wx: float, wy: float, wz: float, a: float, b: float, c: float, dt: float, out: Any, at: int) -> None:

@@ -7,7 +7,15 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["HELPERS", "quaternion_exp", "quaternion_product", "right_jacobian", "rotation"]
+__all__ = [
+    "HELPERS",
+    "quaternion_exp",
+    "quaternion_product",
+    "right_jacobian",
+    "rotation",
+    "turned",
+    "turned_back",
+]
 
 SMALL = 1e-4  # below this angle (rad) the series is exact to 1e-16
 
@@ -24,6 +32,24 @@ def rotation(w: float, x: float, y: float, z: float) -> tuple[float, ...]:
         2.0 * (x * z - w * y),
         2.0 * (y * z + w * x),
         1.0 - 2.0 * (x * x + y * y),
+    )
+
+
+def turned(r: tuple[float, ...], a: float, b: float, c: float) -> tuple[float, float, float]:
+    """R v, with the matrix R given row by row."""
+    return (
+        r[0] * a + r[1] * b + r[2] * c,
+        r[3] * a + r[4] * b + r[5] * c,
+        r[6] * a + r[7] * b + r[8] * c,
+    )
+
+
+def turned_back(r: tuple[float, ...], a: float, b: float, c: float) -> tuple[float, float, float]:
+    """Rᵀ v, with the matrix R given row by row."""
+    return (
+        r[0] * a + r[3] * b + r[6] * c,
+        r[1] * a + r[4] * b + r[7] * c,
+        r[2] * a + r[5] * b + r[8] * c,
     )
 
 

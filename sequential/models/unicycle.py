@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+
+from numpy.typing import ArrayLike
 
 from sequential.errors import ModelError
 from sequential.manifold import SE2, Manifold, Vector
 from sequential.model import Functions, ProcessModel, as_params
-from sequential.models.parts import find_part
+from sequential.models.parts import find_part, walk_variances
 
 __all__ = ["Unicycle"]
 
@@ -30,6 +33,7 @@ class Unicycle(ProcessModel):
     scale : name of a vector part of two numbers, the shares by which speed and turn rate are really larger
         than the wheels say: u is taken as ((1 + scale[0]) u[0], (1 + scale[1]) u[1])
     pose : name of the SE(2) part; the first one unless given
+    walks : of further parts of the state, by name: random walk, unit/√s; parts without one stand still
 
     Notes
     -----
@@ -45,6 +49,7 @@ class Unicycle(ProcessModel):
     drift: float = 0.0
     scale: str | None = None
     pose: str | None = None
+    walks: Mapping[str, ArrayLike] | None = None
 
     def functions(self, manifold: Manifold) -> Functions:
         """Lowered: see `ProcessModel.functions`."""
@@ -61,7 +66,12 @@ class Unicycle(ProcessModel):
                 raise ModelError(msg)
             scale = (1, s_storage, s_tangent)
         variances = [s * s for s in sigmas]
-        params = as_params(storage, tangent, manifold.size, manifold.dim, variances, scale)
+        others = walk_variances(manifold, self.walks, 0, "Unicycle")
+        if others[tangent : tangent + 3].any():
+            msg = "Unicycle moves the pose itself; its noise is along, across and heading"
+            raise ModelError(msg)
+        walking = (1.0, others) if others.any() else (0.0,)
+        params = as_params(storage, tangent, manifold.size, manifold.dim, variances, scale, *walking)
         return Functions(drive, drive_jacobian, params, 2, drive_noise, helpers=HELPERS)
 
 
@@ -83,7 +93,7 @@ def arc(length: float, turn: float) -> tuple[float, float]:
 
 
 def drive(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
-    """Compose the pose with the arc; p = [storage, tangent, n, d, variances (6), scale (3)]."""
+    """Compose the pose with the arc; p = [storage, tangent, n, d, variances (6), scale (3), walks (d)]."""
     at = int(p[0])
     length, turn = travel(x, u, dt, p)
     a, b = arc(length, turn)
@@ -139,6 +149,9 @@ def drive_noise(x: Any, u: Any, dt: float, p: Any, out: Any) -> None:
     out[at * d + at] += p[4] * dt + p[7] * distance
     out[(at + 1) * d + at + 1] += p[5] * dt
     out[(at + 2) * d + at + 2] += p[6] * dt + p[8] * angle + p[9] * distance
+    if p[13] > 0.0:
+        for i in range(d):
+            out[i * d + i] += p[14 + i] * dt
 
 
 HELPERS = (travel, arc, bent)
