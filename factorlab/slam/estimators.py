@@ -72,7 +72,7 @@ def make(name: str, options: Mapping[str, Any], lag: float = LAG_STEPS) -> SlamE
         from sequential.slam import EkfSlam
 
         return EkfSlam()
-    from factorlab.graph.slam import BatchSlam, FixedLagSlam, GncSlam, IncrementalSlam
+    from factorlab.graph.slam import BatchSlam, FixedLagSlam, IncrementalSlam
     from sequential.model import Loss
 
     if name == "fixed_lag":
@@ -80,5 +80,7 @@ def make(name: str, options: Mapping[str, Any], lag: float = LAG_STEPS) -> SlamE
     if name == "isam2":
         return IncrementalSlam()
     if name == "gnc":
-        return GncSlam(**options)
+        from factorlab.graph.slam.gnc import GncSlam
+
+        return GncSlam()
     return BatchSlam(**options, loss=Loss("cauchy", 2.385) if name == "batch_robust" else None)

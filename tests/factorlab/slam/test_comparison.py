@@ -61,7 +61,9 @@ def test_json_and_terminal_tell_the_same(compared):
 
 
 def test_report_holds_page_json_trajectories_and_maps(compared, tmp_path):
-    page = write_slam_report((compared[1],), {"schema": 1, **compared[1].to_json(), "command": "factorlab"}, tmp_path / "out")
+    page = write_slam_report(
+        (compared[1],), {"schema": 1, **compared[1].to_json(), "command": "factorlab"}, tmp_path / "out"
+    )
     told = json.loads((page.parent / "report.json").read_text())
     assert {f"trajectories/{name}.tum" for name in ROWS} <= set(told["files"])
     assert (page.parent / "maps/batch.csv").read_text().startswith("id,x,y\n")
