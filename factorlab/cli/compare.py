@@ -48,6 +48,7 @@ class Settings:
     seed: int = 0
     check: bool = False
     slam: bool = False
+    lags: str | None = None
 
 
 @click.command(short_help="Estimators side by side on one log.")
@@ -73,6 +74,11 @@ class Settings:
 )
 @robot_option
 @click.option("--slam", is_flag=True, help="Do not use the map: estimate it (mrclam, starry_night).")
+@click.option(
+    "--lags",
+    metavar="A,B",
+    help="Try fixed lags too: s, or steps of a SLAM problem.",
+)
 @max_gap_option
 @as_json
 @click.option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import CHECK_FAILED, DATA_ERROR
-from factorlab.cli.settings import command_line, print_json
+from factorlab.cli.settings import command_line, lags_of, print_json
 
 if TYPE_CHECKING:
     from factorlab.cli.compare import Settings
@@ -36,7 +36,7 @@ def compare_slam_and_show(settings: Settings) -> int:
     from factorlab.report.folder import require_free
     from factorlab.slam import compare_slam
 
-    names = _names(settings.estimators)
+    names, lags = _names(settings.estimators), lags_of(settings.lags)
     if settings.tune:
         raise click.UsageError("--tune fits the noise of a chain; a SLAM problem keeps the noise it states")
     for name in CHAIN_ONLY:
@@ -48,7 +48,7 @@ def compare_slam_and_show(settings: Settings) -> int:
     done = []
     for dataset in _datasets(settings):
         with _progress(dataset.name) as progress:
-            done.append(compare_slam(dataset, names, seed=settings.seed, progress=progress))
+            done.append(compare_slam(dataset, names, seed=settings.seed, lags=lags, progress=progress))
     comparisons = tuple(done)
     if all(comparison.all_failed for comparison in comparisons):
         reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)

@@ -15,6 +15,7 @@ __all__ = [
     "check_option",
     "command_line",
     "config_option",
+    "lags_of",
     "max_gap_option",
     "print_json",
     "robot_option",
@@ -99,6 +100,18 @@ def did_you_mean(key: str, known: Any) -> str:
     """`; did you mean …?`, or the whole list where nothing is near."""
     near = get_close_matches(key, list(known), n=1, cutoff=0.5)
     return f"; did you mean {near[0]!r}?" if near else f"; known are {', '.join(sorted(known))}"
+
+
+def lags_of(given: str | None) -> tuple[float, ...]:
+    """`--lags 1,5,20` as numbers; a usage error for what is not."""
+    if given is None:
+        return ()
+    try:
+        return tuple(float(part) for part in given.split(",") if part.strip())
+    except ValueError as error:
+        raise click.BadParameter(
+            f"{given!r} is not a row of numbers such as 1,5,20", param_hint="--lags"
+        ) from error
 
 
 def command_line() -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from factorlab.compare.verdict import Finding
 from factorlab.datasets.slam import SlamDataset
 from factorlab.slam.estimators import KINDS, make, require_names
+from factorlab.slam.lags import LagPoint, slam_lag_sweep
 from factorlab.slam.scores import MapScore, Scores, map_score_of, scores_of
 from sequential.errors import FactorlabError
 from sequential.history import Run
@@ -83,6 +84,7 @@ class SlamComparison:
     rows: tuple[SlamRow, ...]
     findings: tuple[Finding, ...]
     seed: int
+    lags: tuple[LagPoint, ...] = ()
 
     @property
     def name(self) -> str:
@@ -109,6 +111,7 @@ class SlamComparison:
             "estimators": {row.name: row.to_json() for row in self.rows},
             "reference": dict(self.dataset.reference),
             "findings": [finding.to_json() for finding in self.findings],
+            "lag_sweep": [point.to_json() for point in self.lags],
             "notes": list(self.dataset.notes),
             "seed": self.seed,
         }
@@ -123,6 +126,7 @@ def compare_slam(
     estimators: tuple[str, ...] | None = None,
     *,
     seed: int = 0,
+    lags: Sequence[float] = (),
     progress: Progress = silent,
 ) -> SlamComparison:
     """Run estimators side by side on one SLAM problem.
@@ -131,6 +135,7 @@ def compare_slam(
     ----------
     estimators : names, see `factorlab.slam.NAMES`; by default those that the dataset recommends
     seed : of the resampling behind the bootstrap bands
+    lags : windows, in steps, at which a fixed-lag smoother is tried as well
     progress : called with what is being done, how much is done, and out of how much
 
     Raises
@@ -153,7 +158,8 @@ def compare_slam(
     rows = tuple(_row(name, dataset, solved, seconds, stand_in, seed) for name in names)
     from factorlab.slam.verdicts import findings_of
 
-    return SlamComparison(dataset, rows, findings_of(dataset, rows), seed)
+    swept = slam_lag_sweep(dataset, lags, stand_in, seed) if lags else ()
+    return SlamComparison(dataset, rows, findings_of(dataset, rows), seed, swept)
 
 
 def _timed(name: str, dataset: SlamDataset) -> tuple[SlamRun, float]:

@@ -9,6 +9,11 @@ from factorlab.slam.text import cells, headings, size_line
 
 __all__ = ["slam_document"]
 
+LAG_WORDS = (
+    "A fixed-lag smoother holds the poses of its last steps and all landmarks; this is its estimate of the "
+    "newest pose. A longer window relinearises more of the past."
+)
+
 
 def slam_document(comparisons: tuple[SlamComparison, ...], command: str) -> Document:
     """One page for one problem, or for the same problem of several vehicles."""
@@ -85,9 +90,21 @@ def _sections(comparison: SlamComparison, prefix: str) -> list[Section]:
             "an honest estimate stays around 1.",
         ),
     ]
+    if comparison.lags:
+        sections.append(Section(f"{prefix}What waiting is worth", LAG_WORDS, _lag_table(comparison)))
     if dataset.notes:
         sections.append(Section(f"{prefix}How to read this", "\n\n".join(dataset.notes)))
     return [section for section in sections if not _empty(section)]
+
+
+def _lag_table(comparison: SlamComparison) -> Table:
+    """RMSE, honesty and cost at each lag."""
+    body = tuple(
+        (f"{point.lag:g}", point.rmse, point.anees_per_dof, point.us_per_measurement)
+        for point in comparison.lags
+        if not point.message
+    )
+    return Table((("lag", "steps"), ("RMSE", "m"), ("ANEES/dof", "1 exp."), ("per reading", "µs")), body)
 
 
 def _empty(section: Section) -> bool:
