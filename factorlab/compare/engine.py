@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.compare.accuracy import errors_of
+from factorlab.compare.axes import axis_errors
 from factorlab.compare.estimators import EVERY_NAME, KINDS, require_names
 from factorlab.compare.fitting import fit
 from factorlab.compare.honesty import nis_of, normalised_error_of
@@ -140,4 +141,5 @@ def _row(name: str, dataset: Dataset, problem: Problem, seed: int, run: Run, sec
         run.report.converged,
         run.report.message,
         run,
+        axis_errors(dataset, run),
     )

@@ -9,6 +9,7 @@ from math import isfinite
 from typing import Any, Protocol
 
 from factorlab.compare.accuracy import Errors
+from factorlab.compare.axes import AxisErrors
 from factorlab.compare.estimators import KINDS
 from factorlab.compare.honesty import Nis, NormalisedError
 from factorlab.compare.verdict import Finding
@@ -36,6 +37,7 @@ class Row:
     converged: bool = False
     message: str = ""
     run: Run | None = field(default=None, repr=False)
+    axes: AxisErrors | None = field(default=None, repr=False)
 
     @property
     def title(self) -> str:
@@ -65,6 +67,7 @@ class Row:
         return plain | {
             "normalised_error": None if self.normalised_error is None else self.normalised_error.to_json(),
             "nis": None if self.nis is None else self.nis.to_json(),
+            "axes": None if self.axes is None else self.axes.to_json(),
             "seconds": self.seconds,
             "us_per_measurement": self.us_per_measurement,
             "iterations": self.iterations,

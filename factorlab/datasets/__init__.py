@@ -18,6 +18,7 @@ from factorlab.datasets.mrclam import load_mrclam
 from factorlab.datasets.plaza import load_plaza
 from factorlab.datasets.rail import load_rail
 from factorlab.datasets.slam import SlamDataset
+from factorlab.datasets.starry_night import load_starry_night
 from sequential.errors import DataError
 
 __all__ = ["NAMES", "SLAM_NAMES", "Dataset", "SlamDataset", "Truth", "load", "load_slam"]
@@ -28,6 +29,7 @@ _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
     "plaza2": lambda _use_every, data, _robot: [load_plaza(2, data)],
     "mrclam": lambda _use_every, data, robot: load_mrclam(data, robot),
     "rail": lambda _use_every, data, _robot: [load_rail(data)],
+    "starry_night": lambda _use_every, data, _robot: [load_starry_night(data)],
 }
 NAMES = tuple(_LOADERS)
 

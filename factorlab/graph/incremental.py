@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 
 NOT_NATIVE = "no native factors: the windows were solved by the chain solver"
+NOT_ONE_STEP = "one step an update is too few for these factors: the chain solver settled each window"
 
 
 def isam_parameters(threshold: float) -> Any:
@@ -42,6 +43,12 @@ def require_native(problem: Problem, name: str) -> NativeGraph:
         msg = (
             f"{name} needs native GTSAM factors, which this model's process or sensors do not have; "
             "use FixedLagGraph(), BatchGraph() or IteratedSmoother()"
+        )
+        raise ModelError(msg)
+    if not native.incremental:
+        msg = (
+            f"{name} takes one Gauss-Newton step an update, which loses track of these factors; use "
+            "FixedLagGraph(), BatchGraph() or IteratedSmoother()"
         )
         raise ModelError(msg)
     return native
@@ -109,9 +116,10 @@ class FixedLagGraph:
     def solve(self, problem: Problem) -> Run:
         """Online estimate at each node."""
         native = native_graph(problem)
-        if native is None:
+        if native is None or not native.incremental:
             run = FixedLagSmoother(self.lag).solve(problem)
-            return replace(run, report=replace(run.report, message=NOT_NATIVE))
+            reason = NOT_NATIVE if native is None else NOT_ONE_STEP
+            return replace(run, report=replace(run.report, message=reason))
         engine = gtsam.IncrementalFixedLagSmoother(self.lag, isam_parameters(self.threshold))
         mean, cov, seconds = walk(problem, native, engine.update, engine, stamped=True)
         return online_run(problem, mean, cov, self.name, seconds)

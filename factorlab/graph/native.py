@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 class NativeGraph(abc.ABC):
     """One problem in native variables; `k` counts nodes, `x` is our flat state (n,)."""
 
+    incremental = True  # whether GTSAM's engines, one Gauss-Newton step an update, keep up with it
+
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
@@ -81,7 +83,8 @@ def native_graph(problem: Problem) -> NativeGraph | None:
     """The problem in native factors, or None where a piece has none."""
     # The rooms register themselves when imported.
     import factorlab.graph.factors.inertial
-    import factorlab.graph.factors.planar  # noqa: F401
+    import factorlab.graph.factors.planar
+    import factorlab.graph.factors.spatial  # noqa: F401
 
     # missing components and noises of single readings have no place in a native factor
     return native_process(problem.model.process, problem) if problem.plain else None

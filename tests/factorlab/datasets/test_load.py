@@ -12,7 +12,7 @@ from sequential.jacobians import difference
 
 
 def test_names():
-    assert NAMES == ("kitti", "plaza1", "plaza2", "mrclam", "rail")
+    assert NAMES == ("kitti", "plaza1", "plaza2", "mrclam", "rail", "starry_night")
 
 
 @pytest.mark.parametrize(("name", "hint"), [("kiti", "kitti"), ("plaza", "plaza"), ("mrclam7", "mrclam")])
@@ -22,7 +22,7 @@ def test_an_unknown_name_is_a_sentence(name, hint):
 
 
 def test_a_name_like_no_other_lists_them_all():
-    with pytest.raises(DataError, match=r"only kitti, plaza1, plaza2, mrclam, rail$"):
+    with pytest.raises(DataError, match=r"only kitti, plaza1, plaza2, mrclam, rail, starry_night$"):
         load("zzz")
 
 
