@@ -12,10 +12,12 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from pathlib import Path
 
+from factorlab.datasets.city10000 import load_city10000
 from factorlab.datasets.dataset import Dataset, Truth
 from factorlab.datasets.kitti import load_kitti
 from factorlab.datasets.mrclam import load_mrclam
 from factorlab.datasets.plaza import load_plaza
+from factorlab.datasets.pose_graphs import load_intel, load_mit, load_sphere2500, load_w10000
 from factorlab.datasets.rail import load_rail
 from factorlab.datasets.slam import SlamDataset
 from factorlab.datasets.starry_night import load_starry_night
@@ -33,7 +35,13 @@ _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
 }
 NAMES = tuple(_LOADERS)
 
-_SLAM_LOADERS: dict[str, Callable[[Path | None, int | None], list[SlamDataset]]] = {}
+_SLAM_LOADERS: dict[str, Callable[[Path | None, int | None], list[SlamDataset]]] = {
+    "intel": lambda data, _robot: [load_intel(data)],
+    "mit": lambda data, _robot: [load_mit(data)],
+    "sphere2500": lambda data, _robot: load_sphere2500(data),
+    "w10000": lambda data, _robot: [load_w10000(data)],
+    "city10000": lambda data, _robot: [load_city10000(data)],
+}
 SLAM_NAMES = tuple(_SLAM_LOADERS)
 
 

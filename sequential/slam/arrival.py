@@ -74,7 +74,8 @@ def placed(problem: SlamProblem) -> Values:
     if problem.start is not None:
         for kind, known in index.items():
             has = problem.start.has(kind, known)
-            rows[kind][has] = problem.start.at(kind, known[has])
+            if has.any():
+                rows[kind][has] = problem.start.at(kind, known[has])
     _follow(problem, index, rows, begun)
     for kind in index:
         rows[kind] = problem.kinds[kind].normalize(rows[kind]) if len(rows[kind]) else rows[kind]

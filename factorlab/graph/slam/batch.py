@@ -39,8 +39,8 @@ class BatchSlam:
     Parameters
     ----------
     initial : where to begin: `"steps"`, each variable placed by the first measurement that determines it;
-        `"given"`, the problem's `start`; `"lago"` (plane), `"chordal"` (space); a function of the problem; or
-        `Values`
+        `"given"`, the problem's `start`; `"lago"` (plane), `"chordal"`, `"tree"`, `"odometry"`, see
+        `sequential.slam.initial`; a function of the problem; or `Values`
     method : `"gauss_newton"`, which goes over to Levenberg-Marquardt where the cost would rise;
         `"levenberg_marquardt"`, or `"dogleg"`
     loss : robust loss of groups that bring none of their own; priors are never doubted

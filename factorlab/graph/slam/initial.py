@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,19 @@ def given(problem: SlamProblem) -> Values:
     return Values(index, {kind: start.at(kind, known) for kind, known in index.items() if len(known)})
 
 
-INITIAL: dict[str, Beginning] = {"steps": placed, "given": given}
+def by(method: str) -> Beginning:
+    """Poses by a method of `sequential.slam.initial`, other variables placed from them."""
+
+    def begin(problem: SlamProblem) -> Values:
+        from sequential.slam.initial import initial_poses
+
+        return placed(replace(problem, start=initial_poses(problem, method)))
+
+    return begin
+
+
+METHODS = ("lago", "chordal", "tree", "odometry")
+INITIAL: dict[str, Beginning] = {"steps": placed, "given": given, **{name: by(name) for name in METHODS}}
 
 
 def initial_values(problem: SlamProblem, initial: str | Values | Beginning, index: dict[str, Ints]) -> Values:

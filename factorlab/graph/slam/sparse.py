@@ -43,6 +43,7 @@ class Normal:
         self.scale = 1.0 / np.sqrt(squared)
         scaled = matrix @ diags_array(self.scale)
         information = (scaled.T @ scaled).tocsc()
+        information.eliminate_zeros()  # weights of zero leave none, and no fill
         if damping:
             information = information + damping * diags_array(np.ones(rows.columns)).tocsc()
         try:
