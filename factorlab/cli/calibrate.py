@@ -28,6 +28,11 @@ COMMANDS = {
         "stereo",
         "Two cameras and their pose, from pairs of pictures of a board.",
     ),
+    "cam-imu": (
+        "factorlab.cli.calibrate_cam_imu",
+        "cam_imu",
+        "Camera and IMU on one rig: rotation, translation, time offset, biases.",
+    ),
     "ferraris": ("factorlab.cli.calibrate_field", "ferraris", "Six positions and three known turns."),
 }
 

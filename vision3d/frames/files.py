@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from sequential.errors import DataError
 
-__all__ = ["IMAGE_SUFFIXES", "find_images", "is_pattern", "named_by_time", "require_path", "stamps_of"]
+__all__ = [
+    "IMAGE_SUFFIXES",
+    "begin_of",
+    "find_images",
+    "is_pattern",
+    "named_by_time",
+    "require_path",
+    "stamps_of",
+]
 
 IMAGE_SUFFIXES = frozenset(
     (".bmp", ".jpeg", ".jpg", ".pbm", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp")
@@ -92,6 +100,11 @@ def stamps_of(paths: list[Path], fps: float | None, default: float) -> tuple[NDA
 def named_by_time(paths: list[Path]) -> bool:
     """Whether the names of several files are times: they are the frames of a video then."""
     return len(paths) > 1 and all(_named_time(path.stem) is not None for path in paths)
+
+
+def begin_of(paths: list[Path]) -> int | None:
+    """The time (ns) in the first name, where names are times: what `stamps_of` counts from."""
+    return _named_time(paths[0].stem) if named_by_time(paths) else None
 
 
 def _named_time(stem: str) -> int | None:

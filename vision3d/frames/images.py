@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import FileFormatError
-from vision3d.frames.files import named_by_time, stamps_of
+from vision3d.frames.files import begin_of, named_by_time, stamps_of
 from vision3d.frames.source import FrameSource, in_colour, quiet
 
 __all__ = ["ImageFrames"]
@@ -28,6 +28,7 @@ class ImageFrames(FrameSource):
         if first is None:
             raise FileFormatError(f"none of the {len(paths)} images of {name} can be read; are they images?")
         super().__init__(name, first.shape[1::-1], rate, len(paths), loop=loop)
+        self.begin_ns = begin_of(paths) if fps is None else None
 
     def _lap(self) -> Iterator[tuple[int, str, NDArray[np.uint8]]]:
         bad: dict[Path, str] = {}

@@ -56,6 +56,7 @@ class FrameSource(ABC):
     stills : frames are photographs
     fault : why it broke off; empty where it did not
     left_out : sentences about single frames that could not be used
+    begin_ns : time of the first frame by a clock that others share, where names of files tell it
     """
 
     live = stills = False
@@ -66,6 +67,7 @@ class FrameSource(ABC):
         self.name, self.size, self.fps, self.count, self.loop = name, size, fps, count, loop
         self.fault = ""
         self.left_out: tuple[str, ...] = ()
+        self.begin_ns: int | None = None
 
     def __enter__(self) -> Self:
         return self
