@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,8 +39,8 @@ class BatchSlam:
     Parameters
     ----------
     initial : where to begin: `"steps"`, each variable placed by the first measurement that determines it;
-        `"given"`, the problem's `start`; `"lago"` (plane), `"chordal"`, `"tree"`, `"odometry"`, see
-        `sequential.slam.initial`; a function of the problem; or `Values`
+        `"given"`, the problem's `start`; `"lago"`, `"chordal"`, `"tree"` or `"odometry"`, poses by
+        `sequential.slam.initial` and the rest placed from them; a function of the problem; or `Values`
     method : `"gauss_newton"`, which goes over to Levenberg-Marquardt where the cost would rise;
         `"levenberg_marquardt"`, or `"dogleg"`
     loss : robust loss of groups that bring none of their own; priors are never doubted
@@ -144,10 +144,7 @@ class BatchSlam:
             message=solved.message(),
             details=details,
         )
-        covs: Mapping[str, Array] = {}
-        if self.covariance:
-            kinds = tuple(index) if self.covariance is True else tuple(self.covariance)
-            covs = marginals(Rows(problem, index, self.loss), solved.values, kinds)
+        covs = marginals(problem, solved.values, asked=self.covariance, loss=self.loss)
         return SlamRun(solved.values, covs, dict(problem.kinds), report)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from factorlab.graph.slam.checks import check_problem
 from factorlab.graph.slam.graduated import SCHEDULES, Schedule
 from factorlab.graph.slam.initial import initial_values
-from factorlab.graph.slam.marginals import marginals
+from factorlab.graph.slam.marginals import marginals_of
 from factorlab.graph.slam.rows import Rows
 from factorlab.graph.slam.sparse import solve_rows
 from factorlab.graph.solve import Solved
@@ -115,7 +115,7 @@ class GncSlam:
         covs: Mapping[str, Array] = {}
         if self.covariance:
             kinds = tuple(index) if self.covariance is True else self.covariance or ()
-            covs = marginals(rows.rows, solved.values, kinds)
+            covs = marginals_of(rows.rows, solved.values, kinds)
         report = self._report(problem, rows, solved, cost, outer, seconds)
         return GncResult(SlamRun(solved.values, covs, dict(problem.kinds), report), rows.by_group())
 
@@ -243,7 +243,7 @@ class Weighted:
         plain = tuple(replace(group, loss=None) for group in problem.factors)
         self.rows = Rows(replace(problem, factors=plain), index)
         self.doubts = [doubt for doubt, group in zip(doubts, problem.factors, strict=True) if len(group)]
-        self.roots = list(self.rows.roots)
+        self.roots = [one.root for one in self.rows.whitened]
         dims = [group.model.measured.dim for group in self.rows.groups]
         bounds = [
             np.full(int(doubt.sum()), chi2.ppf(confidence, m))
@@ -263,7 +263,7 @@ class Weighted:
             root = self.roots[number]
             each = np.ones(len(doubt))
             each[doubt] = np.sqrt(weights[first : first + here])
-            self.rows.roots[number] = each[:, None, None] * root
+            self.rows.whitened[number].root = each[:, None, None] * root
             first += here
 
     def weights_now(self) -> Array:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sequential.errors import ModelError
 from sequential.slam import SlamProblem, Values
-from sequential.slam.arrival import placed
+from sequential.slam.beginnings import placed
+from sequential.slam.initial import METHODS, initial_poses
 
 __all__ = ["INITIAL", "given", "initial_values"]
 
@@ -31,19 +32,22 @@ def given(problem: SlamProblem) -> Values:
     return Values(index, {kind: start.at(kind, known) for kind, known in index.items() if len(known)})
 
 
-def by(method: str) -> Beginning:
-    """Poses by a method of `sequential.slam.initial`, other variables placed from them."""
+def from_poses(method: str) -> Beginning:
+    """Poses by a method of `sequential.slam.initial`, everything else placed from them."""
 
     def begin(problem: SlamProblem) -> Values:
-        from sequential.slam.initial import initial_poses
-
-        return placed(replace(problem, start=initial_poses(problem, method)))
+        poses, known = initial_poses(problem, method), problem.start or Values({}, {})
+        index, rows = dict(known.index) | dict(poses.index), dict(known.rows) | dict(poses.rows)
+        return placed(replace(problem, start=Values(index, rows)))
 
     return begin
 
 
-METHODS = ("lago", "chordal", "tree", "odometry")
-INITIAL: dict[str, Beginning] = {"steps": placed, "given": given, **{name: by(name) for name in METHODS}}
+INITIAL: dict[str, Beginning] = {
+    "steps": placed,
+    "given": given,
+    **{method: from_poses(method) for method in METHODS},
+}
 
 
 def initial_values(problem: SlamProblem, initial: str | Values | Beginning, index: dict[str, Ints]) -> Values:

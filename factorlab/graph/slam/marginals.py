@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from factorlab.graph.slam.rows import Rows
 from factorlab.graph.slam.variables import keys_of
 from factorlab.graph.solve import readable
-from sequential.slam import Values
+from sequential.model import Loss
+from sequential.slam import SlamProblem, Values
 
-__all__ = ["gaussian_graph", "marginals"]
+__all__ = ["gaussian_graph", "marginals", "marginals_of"]
 
 Array = NDArray[np.float64]
 
@@ -38,16 +39,27 @@ def gaussian_graph(rows: Rows, values: Values) -> Any:
     return graph
 
 
-def marginals(rows: Rows, values: Values, kinds: tuple[str, ...]) -> dict[str, Array]:
-    """(n, d, d) of the variables of kinds, linearised at the values, robust weights taken there.
+def marginals(
+    problem: SlamProblem, values: Values, *, asked: bool | tuple[str, ...] = True, loss: Loss | None = None
+) -> dict[str, Array]:
+    """(n, d, d) of the variables of all kinds, of those asked for, or of none.
+
+    Linearised at the values, robust weights taken there.
 
     Raises
     ------
     UnderConstrainedError
     """
+    kinds = tuple(values.index) if asked is True else asked or ()
+    if not kinds:
+        return {}
+    return marginals_of(Rows(problem, dict(values.index), loss), values, kinds)
+
+
+def marginals_of(rows: Rows, values: Values, kinds: tuple[str, ...]) -> dict[str, Array]:
+    """The same from rows that are there already; raises `UnderConstrainedError`."""
     with readable():
-        graph = gaussian_graph(rows, values)
-        found = gtsam.Marginals(graph, gtsam.Values())
+        found = gtsam.Marginals(gaussian_graph(rows, values), gtsam.Values())
         return {
             kind: np.array([found.marginalCovariance(key) for key in keys_of(kind, rows.index[kind])])
             for kind in kinds

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from sequential.model import Loss
 from sequential.slam import Factors, SlamProblem, Values
 
-__all__ = ["Rows", "robust"]
+__all__ = ["GroupRows", "Rows", "robust"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+ALL = slice(None)
 
 
 def robust(loss: Loss | None, squared: Array) -> tuple[Array, Array]:
@@ -29,6 +30,46 @@ def robust(loss: Loss | None, squared: Array) -> tuple[Array, Array]:
         safe = np.where(far, norm, 1.0)
         return np.where(far, k * (norm - 0.5 * k), 0.5 * squared), np.where(far, k / safe, 1.0)
     return 0.5 * k * k * np.log1p(squared / (k * k)), k * k / (k * k + squared)
+
+
+class GroupRows:
+    """Measurements of one group, whitened.
+
+    Parameters
+    ----------
+    group : measurements
+    loss : where the group brings none of its own
+    """
+
+    def __init__(self, group: Factors, loss: Loss | None = None) -> None:
+        self.group, self.loss = group, group.loss or loss
+        self.z = np.asarray(group.z)
+        # upper triangles (m, m), or (N, m, m): GTSAM's square root of the information
+        root = np.linalg.cholesky(np.linalg.inv(np.asarray(group.noise_cov)))
+        self.root = np.ascontiguousarray(root.swapaxes(-1, -2))
+
+    def errors(self, at: list[Array], rows: Ints | slice = ALL) -> Array:
+        """(N, m) errors of some rows over their standard deviations, without the loss."""
+        error = self.group.model.errors(self.z[rows], *at)
+        whitened: Array = (self._root(rows) @ error[..., None])[..., 0]
+        return whitened
+
+    def cost(self, at: list[Array]) -> float:
+        """Half the sum of squares, or what the loss makes of it."""
+        return float(robust(self.loss, np.square(self.errors(at)).sum(axis=1))[0].sum())
+
+    def linear(self, at: list[Array], rows: Ints | slice = ALL) -> tuple[Array, Array, Array]:
+        """Slopes (N, m, d_1 + d_2 …) and right sides (N, m) with the loss's weights, and the costs (N,)."""
+        error = self.errors(at, rows)
+        cost, weight = robust(self.loss, np.square(error).sum(axis=1))
+        slope = self._root(rows) @ np.concatenate(self.group.model.jacobians(self.z[rows], *at), axis=-1)
+        if self.loss is not None:
+            lighter = np.sqrt(weight)[:, None]
+            error, slope = error * lighter, slope * lighter[..., None]
+        return slope, -error, cost
+
+    def _root(self, rows: Ints | slice) -> Array:
+        return self.root if self.root.ndim == 2 else self.root[rows]
 
 
 class Rows:
@@ -44,16 +85,13 @@ class Rows:
     def __init__(self, problem: SlamProblem, index: dict[str, Ints], loss: Loss | None = None) -> None:
         self.problem, self.index = problem, index
         self.groups = [group for group in problem.factors if len(group)]
-        self.losses = [group.loss or loss for group in self.groups]
+        self.whitened = [GroupRows(group, loss) for group in self.groups]
         self.first: dict[str, int] = {}
         self.columns = 0
         for kind, known in index.items():
             self.first[kind] = self.columns
             self.columns += len(known) * problem.kinds[kind].dim
         self.where = [self._positions(group) for group in self.groups]
-        self.roots = [_inverse_root(group) for group in self.groups]
-        self.sizes = [len(group) * group.model.measured.dim for group in self.groups]
-        self.weights = [np.ones(len(group)) for group in self.groups]
         self._pattern()
 
     def _positions(self, group: Factors) -> list[Ints]:
@@ -63,7 +101,7 @@ class Rows:
 
     def _pattern(self) -> None:
         """Columns of every number, and where each row begins."""
-        columns, counts = [], []
+        columns, counts = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
         for group, where in zip(self.groups, self.where, strict=True):
             m, parts = group.model.measured.dim, []
             for k, slot in enumerate(group.slots):
@@ -80,38 +118,20 @@ class Rows:
         group, where = self.groups[number], self.where[number]
         return [values.rows[slot][at] for slot, at in zip(group.slots, where, strict=True)]
 
-    def whitened(self, values: Values, number: int) -> Array:
-        """(N, m) errors of a group over their standard deviations, without the loss."""
-        group = self.groups[number]
-        error = group.model.errors(np.asarray(group.z), *self.read(values, number))
-        return _times(self.roots[number], error)
-
     def cost(self, values: Values) -> float:
         """Half the sum of squares, or what the losses make of it: GTSAM's error."""
-        total = 0.0
-        for number in range(len(self.groups)):
-            error = self.whitened(values, number)
-            total += float(robust(self.losses[number], np.square(error).sum(axis=1))[0].sum())
-        return total
+        return sum(rows.cost(self.read(values, n)) for n, rows in enumerate(self.whitened))
 
     def linearise(self, values: Values) -> tuple[Any, Array, float]:
         """A, b and the cost: a step is the least-squares solution of ``A step = b``."""
         from scipy.sparse import csr_array
 
-        data, right, total = [], [], 0.0
-        for number, group in enumerate(self.groups):
-            at = self.read(values, number)
-            error = self.whitened(values, number)
-            cost, weight = robust(self.losses[number], np.square(error).sum(axis=1))
-            self.weights[number] = weight
-            total += float(cost.sum())
-            slope = np.concatenate(group.model.jacobians(np.asarray(group.z), *at), axis=-1)
-            slope = self.roots[number] @ slope
-            if self.losses[number] is not None:
-                lighter = np.sqrt(weight)[:, None]
-                error, slope = error * lighter, slope * lighter[..., None]
+        data, right, total = [np.zeros(0)], [np.zeros(0)], 0.0
+        for number, rows in enumerate(self.whitened):
+            slope, error, cost = rows.linear(self.read(values, number))
             data.append(slope.ravel())
-            right.append(-error.ravel())
+            right.append(error.ravel())
+            total += float(cost.sum())
         shape = (len(self.pointer) - 1, self.columns)
         matrix = csr_array((np.concatenate(data), self.indices, self.pointer), shape=shape)
         return matrix, np.concatenate(right), total
@@ -135,15 +155,3 @@ class Rows:
         kind = max((k for k in self.first if self.first[k] <= column), key=lambda k: self.first[k])
         number = (column - self.first[kind]) // self.problem.kinds[kind].dim
         return kind, int(self.index[kind][number])
-
-
-def _inverse_root(group: Factors) -> Array:
-    """Upper triangles (m, m), or (N, m, m), that whiten: GTSAM's square root of the information."""
-    noise = np.asarray(group.noise_cov)
-    root = np.linalg.cholesky(np.linalg.inv(noise))
-    return np.ascontiguousarray(root.swapaxes(-1, -2))
-
-
-def _times(root: Array, error: Array) -> Array:
-    whitened: Array = (root @ error[..., None])[..., 0]
-    return whitened

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factorlab.graph.slam.checks import free_variable
 from factorlab.graph.slam.rows import Rows
 from factorlab.graph.solve import Solved
 from sequential.errors import UnderConstrainedError
@@ -54,23 +55,31 @@ class Normal:
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:
-            raise self._free(None) from error
-        pivots = np.abs(self.factor.U.diagonal())
-        worst = int(np.argmin(pivots))
-        if not damping and pivots[worst] < FREE:
-            raise self._free(int(np.flatnonzero(self.factor.perm_c == worst)[0]))
+            raise self._free(loosest(information)) from error
+        if not damping and np.abs(self.factor.U.diagonal()).min() < FREE:
+            raise self._free(loosest(information))
 
-    def _free(self, column: int | None) -> UnderConstrainedError:
-        from factorlab.graph.slam.checks import free_variable
-
-        return UnderConstrainedError(
-            free_variable(*(self.rows.variable(column) if column is not None else ("", 0)))
-        )
+    def _free(self, column: int) -> UnderConstrainedError:
+        return UnderConstrainedError(free_variable(*self.rows.variable(column)))
 
     def step(self, matrix: Any, right: Array) -> Array:
         """Solve for a step."""
         found: Array = self.scale * self.factor.solve(self.scale * (matrix.T @ right))
         return found
+
+
+def loosest(information: Any) -> int:
+    """The column that moves most along the direction that an information matrix says least about."""
+    from scipy.sparse import eye_array
+    from scipy.sparse.linalg import splu
+
+    size = information.shape[0]
+    factor = splu((information + 1e-9 * eye_array(size)).tocsc(), permc_spec="MMD_AT_PLUS_A")
+    direction = np.random.default_rng(0).standard_normal(size)
+    for _ in range(4):  # inverse iteration
+        direction = factor.solve(direction)
+        direction /= np.linalg.norm(direction)
+    return int(np.argmax(np.abs(direction)))
 
 
 def solve_rows(rows: Rows, start: Values, max_iterations: int, *, damped: bool = False) -> Solved:

@@ -11,14 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.errors import ModelError
-from sequential.manifold import SE2, SE3, SO2, SO3, Manifold, NavState, Vector
+from sequential.manifold import (
+    SE2,
+    SE3,
+    SO2,
+    SO3,
+    Manifold,
+    NavState,
+    Vector,
+    quaternion_from_matrix,
+)
 from sequential.slam import SlamProblem, Values
 
-__all__ = ["VariableType", "insert_values", "keys_of", "read_values", "require_type", "type_of"]
+__all__ = ["VariableType", "insert_values", "keys_of", "read_all", "read_values", "require_type", "type_of"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 SHIFT = 56  # a gtsam.Symbol is a letter above so many bits of index
+LOW = np.uint64((1 << SHIFT) - 1)
+FEW = 20  # variables below which bulk access does not pay
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,13 +118,58 @@ def insert_values(problem: SlamProblem, values: Values) -> Any:
     return found
 
 
+def read_all(problem: SlamProblem, source: Any) -> Values:
+    """Every variable of `gtsam.Values` that is of a kind of the problem, as ours; in bulk where GTSAM can."""
+    keys = np.array(source.keys(), dtype=np.uint64)
+    letters, index = (keys >> np.uint64(SHIFT)).astype(np.int64), (keys & LOW).astype(np.int64)
+    found: dict[str, Ints] = {}
+    rows: dict[str, Array] = {}
+    for kind, manifold in problem.kinds.items():
+        here = letters == ord(kind)
+        if here.any():
+            found[kind] = index[here]
+            rows[kind] = _rows_of(kind, manifold, source, keys, letters)
+    return Values(found, rows)
+
+
+def _rows_of(kind: str, manifold: Manifold, source: Any, keys: Any, letters: Ints) -> Array:
+    """(n, size) all variables of one kind, by ascending key."""
+    if isinstance(manifold, Vector):
+        return np.array(gtsam.utilities.extractVectors(source, kind)).reshape(-1, manifold.size)
+    name = require_type(manifold, kind).name
+    here = keys[letters == ord(kind)].tolist()
+    if name in BULK and len(here) > FEW:
+        whole, place = BULK[name](source), 0
+        # all poses come together, in the order of their keys
+        for letter in np.unique(letters).tolist():
+            count, first = int((letters == letter).sum()), keys[letters == letter][0]
+            if letter == ord(kind):
+                return np.ascontiguousarray(whole[place : place + count])
+            place += count if _is_a(source, name, int(first)) else 0
+    at, to_row = getattr(source, f"at{name}"), require_type(manifold, kind).to_row
+    return np.array([to_row(at(key)) for key in here], dtype=np.float64).reshape(-1, manifold.size)
+
+
+def _is_a(source: Any, name: str, key: int) -> bool:
+    """Whether a variable is of a type."""
+    try:
+        getattr(source, f"at{name}")(key)
+    except RuntimeError:
+        return False
+    return True
+
+
+def _flat_poses(source: Any) -> Array:
+    """(n, 7) all poses of space."""
+    flat = gtsam.utilities.extractPose3(source)
+    turn = quaternion_from_matrix(flat[:, :9].reshape(-1, 3, 3))
+    return np.concatenate([turn, flat[:, 9:]], axis=1)
+
+
+BULK = {"Pose2": lambda source: np.array(gtsam.utilities.extractPose2(source)), "Pose3": _flat_poses}
+
+
 def read_values(problem: SlamProblem, source: Any, index: dict[str, Ints]) -> Values:
-    """Variables of `gtsam.Values` as ours."""
-    rows = {}
-    for kind, known in index.items():
-        manifold = problem.kinds[kind]
-        found = require_type(manifold, kind)
-        at = getattr(source, f"at{found.name}")
-        row = np.array([found.to_row(at(key)) for key in keys_of(kind, known)], dtype=np.float64)
-        rows[kind] = row.reshape(-1, manifold.size)
-    return Values(dict(index), rows)
+    """Variables of `gtsam.Values` as ours; raises `DataError` where one is missing."""
+    found = read_all(problem, source)
+    return Values(dict(index), {kind: found.at(kind, known) for kind, known in index.items()})

@@ -95,8 +95,7 @@ class Projection(FactorModel):
         body, by_pose, by_point = seen_from(SE3(), *values)
         seen, turn = into_camera(self.body_T_camera, body)  # type: ignore[arg-type]
         pixels, slope, _ = self.camera.project_jacobians(np.ascontiguousarray(seen))
-        blind = ~np.isfinite(pixels).all(axis=-1, keepdims=True)
-        slope = np.where(blind[..., None], 0.0, slope)
+        slope = np.where(np.isfinite(pixels).all(axis=-1).reshape(-1, 1, 1), slope, 0.0)
         slope = slope if turn is None else slope @ turn
         return slope @ by_pose, slope @ by_point
 

@@ -1,8 +1,8 @@
-"""The order in which measurements arrive, and where each variable is begun.
+"""Where every variable of a problem begins, quickly: for a batch that has no estimates on the way.
 
-`arrivals` lists the measurements step by step.  `begin` chooses for every variable the first measurement that
-determines it, and `placed` follows these choices: chains of relative poses by pointer jumping, so that ten
-thousand poses take a dozen vectorised rounds.
+For every variable the first measurement that determines it is chosen, and the choices are followed at once:
+chains of relative poses by pointer jumping, so that ten thousand poses take a dozen vectorised rounds.  What
+no single measurement determines goes to `sequential.slam.placing`, one variable at a time.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from sequential.manifold import Array
 from sequential.slam.estimate import Values
 from sequential.slam.models.groups import compose, inverse
 from sequential.slam.models.relative import Between
+from sequential.slam.placing import place_all
 from sequential.slam.problem import Factors, SlamProblem
 
-__all__ = ["Beginning", "arrivals", "placed", "who"]
+__all__ = ["Beginning", "able", "in_order", "placed", "who"]
 
 Ints = NDArray[np.int64]
 Variable = tuple[str, int]
@@ -39,7 +40,7 @@ def who(group: Factors) -> str:
     return group.name or type(group.model).__name__
 
 
-def arrivals(problem: SlamProblem) -> tuple[Ints, Ints, Ints]:
+def in_order(problem: SlamProblem) -> tuple[Ints, Ints, Ints]:
     """Step, group and row of every measurement, in the order of steps, groups and rows; (M,) each."""
     steps = np.concatenate([np.zeros(0, dtype=np.int64), *problem.steps])
     groups = np.repeat(np.arange(len(problem.factors)), [len(group) for group in problem.factors])
@@ -50,25 +51,46 @@ def arrivals(problem: SlamProblem) -> tuple[Ints, Ints, Ints]:
 
 def able(group: Factors, slot: int) -> bool:
     """Whether the model of a group can place that slot at all."""
-    row = np.zeros((1, group.model.measured.size))
-    row[:] = np.asarray(group.z)[:1]
     known = [None if k == slot else m.identity()[None] for k, m in enumerate(group.model.manifolds)]
-    try:
-        group.model.place(slot, row, *known)
-    except ModelError:
-        return False
-    return True
+    for row in {0, len(group) // 2, len(group) - 1}:
+        try:
+            group.model.place(slot, np.asarray(group.z)[row : row + 1], *known)
+        except ModelError:
+            continue
+        return True
+    return False
 
 
 def placed(problem: SlamProblem) -> Values:
-    """Values of all variables: those of `problem.start`, others by the first measurement that places them.
+    """Values of all variables: those of `problem.start`, others by the first measurements that place them.
 
     Raises
     ------
     UnderConstrainedError
-        naming a variable that no single measurement determines.
+        naming a variable that no measurements determine.
     """
     begun = _beginnings(problem)
+    found = None if begun is None else _values(problem, begun)
+    if found is not None and all(np.isfinite(rows).all() for rows in found.rows.values()):
+        return found
+    placing = place_all(problem)
+    if placing.waiting:
+        (kind, i), count = next(iter(placing.waiting.items()))
+        what = (
+            "the only measurement that names it does not say"
+            if count == 1
+            else (f"{count} measurements that name it do not say, even together,")
+        )
+        msg = (
+            f"nothing says where {kind}{i} is to begin: {what} enough, or from variables that are not known "
+            "either; give it a value in problem.start, or add a prior or more measurements"
+        )
+        raise UnderConstrainedError(msg)
+    return placing.values()
+
+
+def _values(problem: SlamProblem, begun: dict[Variable, Beginning]) -> Values | None:
+    """What the beginnings lead to; None where a measurement does not determine its variable after all."""
     index = {kind: problem.indices(kind) for kind in problem.kinds}
     rows = {kind: np.full((len(index[kind]), problem.kinds[kind].size), np.nan) for kind in problem.kinds}
     if problem.start is not None:
@@ -76,14 +98,17 @@ def placed(problem: SlamProblem) -> Values:
             has = problem.start.has(kind, known)
             if has.any():
                 rows[kind][has] = problem.start.at(kind, known[has])
-    _follow(problem, index, rows, begun)
+    try:
+        _follow(problem, index, rows, begun)
+    except ModelError:
+        return None
     for kind in index:
         rows[kind] = problem.kinds[kind].normalize(rows[kind]) if len(rows[kind]) else rows[kind]
     return Values(index, rows)
 
 
-def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning]:
-    """How each variable without a start is begun, in the order in which that happens."""
+def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning] | None:
+    """How each variable without a start is begun; None where single measurements do not suffice."""
     known: set[Variable] = set()
     if problem.start is not None:
         known = {(kind, i) for kind, index in problem.start.index.items() for i in index.tolist()}
@@ -94,7 +119,7 @@ def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning]:
     ]
     begun: dict[Variable, Beginning] = {}
     waiting: list[tuple[int, int]] = []
-    _, groups, rows = arrivals(problem)
+    _, groups, rows = in_order(problem)
     order = list(zip(groups.tolist(), rows.tolist(), strict=True))
     while order:
         count, waiting = len(begun), []
@@ -114,22 +139,8 @@ def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning]:
         if len(begun) == count:
             break
         order = waiting
-    _require_all(problem, known)
-    return begun
-
-
-def _require_all(problem: SlamProblem, known: set[Variable]) -> None:
-    for kind in problem.kinds:
-        for i in problem.indices(kind).tolist():
-            if (kind, i) in known:
-                continue
-            readers = sorted({who(g) for g in problem.factors if kind in g.slots})
-            msg = (
-                f"no single measurement says where {kind}{i} is to begin: its kind is named by "
-                f"{', '.join(readers)}, but from variables that are not known, or without determining it; "
-                "give it a value in problem.start, or add a prior"
-            )
-            raise UnderConstrainedError(msg)
+    whole = {(kind, i) for kind in problem.kinds for i in problem.indices(kind).tolist()}
+    return begun if whole <= known else None
 
 
 def _follow(
@@ -218,7 +229,5 @@ def _round(
             rows[slot][[place[slot][i] for i in index[ready, missing].tolist()]] = found
         waiting += [item for item, is_ready in zip(items, ready.tolist(), strict=True) if not is_ready]
     if len(waiting) == len(others):
-        kind, i, _ = waiting[0]
-        msg = f"{kind}{i} could not be placed: the variables it is measured from are unknown"
-        raise UnderConstrainedError(msg)
+        raise ModelError("a measurement left the variable that it was to begin unknown")
     return waiting
