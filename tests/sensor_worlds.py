@@ -75,7 +75,8 @@ def context_of(name, rng):
         return rng.standard_normal(3)
     if name == "two modes":
         first, second = sq.SO3().random(rng, shape=(2,))
-        return np.concatenate([first, second, [0.7]])
+        covs = [root @ root.T + 0.1 * np.eye(3) for root in 0.3 * rng.standard_normal((2, 3, 3))]
+        return sq.two_mode_readings([0.0], [first], [second], 2.0, covs[:1], covs[1:]).context[0]
     return np.zeros(1)
 
 

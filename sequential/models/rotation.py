@@ -12,7 +12,9 @@ __all__ = [
     "quaternion_exp",
     "quaternion_product",
     "right_jacobian",
+    "right_jacobian_inverse",
     "rotation",
+    "rotation_vector",
     "turned",
     "turned_back",
 ]
@@ -99,6 +101,36 @@ def right_jacobian(a: float, b: float, c: float) -> tuple[float, ...]:
         -f * a + g * b * c,
         1.0 - g * (a * a + b * b),
     )
+
+
+def right_jacobian_inverse(a: float, b: float, c: float) -> tuple[float, ...]:
+    """Inverse of the right Jacobian of SO(3) at (a, b, c), row by row (Solà et al. 2018, eq. 144)."""
+    square = a * a + b * b + c * c
+    if square < SMALL * SMALL:
+        g = 1.0 / 12.0 + square / 720.0
+    else:
+        half = 0.5 * math.sqrt(square)
+        g = (1.0 - half * math.cos(half) / math.sin(half)) / square
+    return (
+        1.0 - g * (b * b + c * c),
+        -0.5 * c + g * a * b,
+        0.5 * b + g * a * c,
+        0.5 * c + g * a * b,
+        1.0 - g * (a * a + c * c),
+        -0.5 * a + g * b * c,
+        -0.5 * b + g * a * c,
+        0.5 * a + g * b * c,
+        1.0 - g * (a * a + b * b),
+    )
+
+
+def rotation_vector(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Rotation vector of a unit quaternion, at most π long."""
+    if w < 0.0:
+        w, x, y, z = -w, -x, -y, -z
+    s = math.sqrt(x * x + y * y + z * z)
+    k = 2.0 if s < SMALL * SMALL else 2.0 * math.atan2(s, w) / s
+    return k * x, k * y, k * z
 
 
 HELPERS = (rotation, quaternion_exp, quaternion_product, right_jacobian)

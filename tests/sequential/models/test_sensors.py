@@ -83,11 +83,13 @@ def pair(parts, u):
 
 
 def likelier(parts, u):
-    """The reading's image that is as far from the first reading as the truth is from the nearest one."""
+    """A state as far from the first reading, in its sigmas, as the truth is from the likelier in its own."""
     own, e = sq.SO3(), turned(parts, TILTED)
-    precision = np.linalg.inv(SENSORS["two modes"].noise_cov)
-    steps = [own.local(q, e) for q in (u[:4], u[4:8])]
-    costs = [0.5 * s @ precision @ s for s in steps]
+    information = np.zeros((3, 3))
+    information[np.triu_indices(3)] = u[9:15]
+    information += np.triu(information, 1).T
+    steps = [own.local(u[:4], e), u[15:].reshape(3, 3) @ own.local(u[4:8], e)]
+    costs = [0.5 * s @ information @ s for s in steps]
     return own.retract(u[:4], steps[int(costs[1] < costs[0] - u[8])])
 
 
@@ -173,6 +175,26 @@ def test_wheels_say_zero_across():
     assert stream.context.shape == (2, 3)
     with pytest.raises(ShapeError, match=r"\(N,\)"):
         sq.wheel_readings([0.0], [[1.0, 2.0]])
+
+
+def test_each_mode_is_weighed_by_its_own_noise(rng):
+    """Half the squared distance of either mode, and its volume and odds: the largest term of the mixture."""
+    own, world_q_body = sq.SO3(), sq.SO3().random(rng)
+    f = sq.TwoModeOrientation(1.0).functions(own)
+    taken = set()
+    for _ in range(40):
+        modes = own.retract(world_q_body, 0.3 * rng.standard_normal((2, 3)))
+        covs = np.array([0.1 * root @ root.T + 0.02 * np.eye(3) for root in rng.standard_normal((2, 3, 3))])
+        steps = own.local(modes, world_q_body)
+        squares = np.einsum("ki,kij,kj->k", steps, np.linalg.inv(covs), steps)
+        chances = np.array([0.7, 0.3]) * np.exp(-0.5 * squares) / np.sqrt(np.linalg.det(covs))
+        stream = sq.two_mode_readings([0.0], modes[:1], modes[1:], 0.7 / 0.3, covs[:1], covs[1:])
+        expected = evaluate(f.value, world_q_body, stream.context[0], 0.0, f.params, 4)
+        off = own.local(modes[0], expected)
+        best = int(chances.argmax())
+        taken.add(best)
+        assert off @ np.linalg.solve(covs[0], off) == pytest.approx(squares[best], rel=1e-9)
+    assert taken == {0, 1}
 
 
 def test_a_second_reading_may_be_absent():
