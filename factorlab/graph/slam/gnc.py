@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.slam.checks import check_problem
-from factorlab.graph.slam.graduated import SCHEDULES, Schedule
+from factorlab.graph.slam.graduated import SCHEDULES
 from factorlab.graph.slam.initial import initial_values
 from factorlab.graph.slam.marginals import marginals_of
-from factorlab.graph.slam.rows import Rows
+from factorlab.graph.slam.reconsider import reconsidered
 from factorlab.graph.slam.sparse import solve_rows
+from factorlab.graph.slam.weighted import Weighted
 from factorlab.graph.solve import Solved
 from sequential.errors import DataError, ModelError, UnderConstrainedError
 from sequential.history import Report
@@ -33,6 +34,7 @@ FIRST = 10  # Gauss-Newton steps with all weights one: a rough answer will do
 STEPS = 2  # Gauss-Newton steps between two looks at the weights
 OUTER = 200
 BELIEVED = 0.5
+GENEROUS = 10.0  # times the fitted variance: a stated one beyond that is no measure of an outlier
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +64,8 @@ class GncSlam:
         variables of one kind that are not neighbours.  All others are known inliers
     initial : a start as of `BatchSlam`, tried beside `"trusted"`: what the trusted measurements alone say.
         The lower robust cost wins
+    reconsider : with `"tls"`, drop or add single measurements afterwards while that lowers the cost; where
+        what is believed fits √10 times better than its σ say, bounds shrink to √10 times what is fitted
     covariance : marginals of all kinds, of the named kinds, or none
     max_iterations : of Gauss-Newton at the end, with the last weights
     check : raise where the last solve has not settled
@@ -71,6 +75,7 @@ class GncSlam:
     confidence: float = 0.99
     doubted: tuple[str, ...] | None = None
     initial: str | Values | Callable[[SlamProblem], Values] = "trusted"
+    reconsider: bool = True
     covariance: bool | tuple[str, ...] = True
     max_iterations: int = 100
     check: bool = True
@@ -105,9 +110,16 @@ class GncSlam:
         tried = []
         for start in self._starts(problem, doubts):
             values, outer = self._graduate(rows, start)
+            if self.reconsider and self.loss == "tls":
+                values = reconsidered(rows, values, SCHEDULES[self.loss])
             tried.append((rows.robust_cost(values, SCHEDULES[self.loss]), values, outer, rows.weights_now()))
         cost, values, outer, weights = min(tried, key=lambda one: one[0])
         rows.weigh(weights)
+        if self.reconsider and self.loss == "tls" and rows.tighten(values, GENEROUS):
+            rows.weigh(weights * (rows.squared(values) <= rows.bound))
+            values = solve_rows(rows.rows, values, self.max_iterations).values
+            values = reconsidered(rows, values, SCHEDULES[self.loss])
+            cost = rows.robust_cost(values, SCHEDULES[self.loss])
         solved = solve_rows(rows.rows, values, self.max_iterations)
         if self.check:
             solved.checked()
@@ -219,87 +231,3 @@ def _trusted(problem: SlamProblem, doubts: list[Flags]) -> SlamProblem:
                 )
             )
     return SlamProblem(problem.kinds, tuple(kept), problem.moving, None, problem.t)
-
-
-class Weighted:
-    """The rows of a problem with weights on what is doubted.
-
-    Parameters
-    ----------
-    doubts : (N,) of each group
-    confidence : quantile of χ² that bounds an inlier
-    """
-
-    def __init__(
-        self,
-        problem: SlamProblem,
-        index: dict[str, NDArray[np.int64]],
-        doubts: list[Flags],
-        confidence: float,
-    ) -> None:
-        from scipy.stats import chi2
-
-        self.problem = problem
-        plain = tuple(replace(group, loss=None) for group in problem.factors)
-        self.rows = Rows(replace(problem, factors=plain), index)
-        self.doubts = [doubt for doubt, group in zip(doubts, problem.factors, strict=True) if len(group)]
-        self.roots = [one.root for one in self.rows.whitened]
-        dims = [group.model.measured.dim for group in self.rows.groups]
-        bounds = [
-            np.full(int(doubt.sum()), chi2.ppf(confidence, m))
-            for doubt, m in zip(self.doubts, dims, strict=True)
-        ]
-        self.bound = np.concatenate(bounds) if bounds else np.zeros(0)
-        self.count = len(self.bound)
-        self._weights = np.ones(self.count)
-
-    def weigh(self, weights: Array) -> None:
-        """Set the weights (count,) of all doubted measurements."""
-        self._weights, first = weights, 0
-        for number, doubt in enumerate(self.doubts):
-            here = int(doubt.sum())
-            if not here:
-                continue
-            root = self.roots[number]
-            each = np.ones(len(doubt))
-            each[doubt] = np.sqrt(weights[first : first + here])
-            self.rows.whitened[number].root = each[:, None, None] * root
-            first += here
-
-    def weights_now(self) -> Array:
-        """(count,)."""
-        return self._weights
-
-    def squared(self, values: Values) -> Array:
-        """(count,) squared whitened residuals of what is doubted, weights left out."""
-        found = []
-        for number, doubt in enumerate(self.doubts):
-            if doubt.any():
-                group = self.rows.groups[number]
-                error = group.model.errors(np.asarray(group.z), *self.rows.read(values, number))[doubt]
-                root = self.roots[number]
-                root = root[doubt] if root.ndim == 3 else root
-                found.append(np.square((root @ error[..., None])[..., 0]).sum(axis=1))
-        return np.concatenate(found) if found else np.zeros(0)
-
-    def robust_cost(self, values: Values, schedule: Schedule) -> float:
-        """Twice the cost of what is trusted, and what the schedule makes of the rest."""
-        now, self._weights = self._weights, self._weights
-        self.weigh(np.zeros(self.count))
-        trusted = 2.0 * self.rows.cost(values)
-        self.weigh(now)
-        return trusted + schedule.cost(self.squared(values), self.bound)
-
-    def by_group(self) -> tuple[Array, ...]:
-        """(N,) for each group of the problem."""
-        found, first, full = [], 0, iter(self.doubts)
-        for group in self.problem.factors:
-            each = np.ones(len(group))
-            if len(group):
-                doubt = next(full)
-                here = int(doubt.sum())
-                each[doubt] = self._weights[first : first + here]
-                first += here
-            each.flags.writeable = False
-            found.append(each)
-        return tuple(found)
