@@ -8,13 +8,15 @@ from typing import Any
 import click
 
 from factorlab.cli.faults import in_one_sentence
+from factorlab.cli.marker_map import map_options, only_with_map
+from factorlab.cli.recording import recording_options
 from factorlab.cli.settings import as_json, check_option, command_line, config_option
 
 __all__ = ["markers"]
 
 
 @click.command(short_help="ArUco and AprilTag markers of a picture or video, with poses and odds.")
-@click.argument("source", metavar="SOURCE")
+@click.argument("source", metavar="SOURCE", required=False)
 @click.option(
     "--camera",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -39,14 +41,27 @@ __all__ = ["markers"]
 @click.option("--force", is_flag=True, help="Write over an earlier report in DIR.")
 @check_option
 @config_option
+@map_options
+@recording_options
 @in_one_sentence
-def markers(source: str, **options: Any) -> int:
+def markers(source: str | None, **options: Any) -> int:
     """Markers in SOURCE, a picture, a folder or pattern of pictures, or a video.
 
     Numbers and corners need nothing else; with --camera and --size every marker has a pose: both readings
     that its four corners allow, the covariance of each, and the odds between them. In a video the markers
     are followed, and motion decides what single frames leave open.
+
+    With --map DIR the markers themselves are placed, relative to one of them, and the camera's way with them;
+    with --imu also velocity and biases, in a world whose z points up. --demo --map DIR shows it on a
+    simulated room.
     """
+    if options["map_out"] is not None or options["demo"]:
+        from factorlab.cli.marker_map import run_map
+
+        return run_map(source, options)
+    if source is None:
+        raise click.UsageError("give SOURCE: a picture, a folder or pattern of pictures, or a video")
+    only_with_map(options)
     from factorlab.cli.delivery import deliver, require_output
     from factorlab.markers import markers_document, read_markers
     from factorlab.markers.export import marker_files

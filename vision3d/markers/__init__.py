@@ -10,6 +10,7 @@ from vision3d.markers.boards import BoardPose, board_pose, find_board_pose, mark
 from vision3d.markers.detection import Marker, detect_markers, find_markers
 from vision3d.markers.hypothesis import MarkerMotion
 from vision3d.markers.pose import CERTAIN, MarkerPose, Mode, marker_corners, marker_pose, marker_poses
+from vision3d.markers.sightings import MarkerSightings
 from vision3d.markers.tracking import MarkerTracker, TrackedMarker
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Marker",
     "MarkerMotion",
     "MarkerPose",
+    "MarkerSightings",
     "MarkerTracker",
     "Mode",
     "TrackedMarker",

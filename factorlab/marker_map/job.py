@@ -1,0 +1,198 @@
+"""`factorlab markers … --map`: a video, perhaps with an IMU's recording, becomes a map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factorlab.marker_map.clock import ClockOffset, clock_offset, require_overlap
+from factorlab.marker_map.mapping import USUAL, Inertial, MarkerMap, map_markers
+from sequential.errors import DataError, FileFormatError
+from sequential.noise import ImuNoise
+from vision3d.markers.sightings import MarkerSightings
+
+if TYPE_CHECKING:
+    from factorlab.marker_map.extrinsics import Extrinsics
+    from sequential.sensors.recording import ImuRecording
+    from vision3d.camera import Camera
+    from vision3d.frames import Frame
+    from vision3d.markers import Marker
+
+__all__ = ["MapJob", "MapSettings", "map_sightings", "read_sightings", "read_stamps"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+STILL_S = 10.0  # photographs are that far apart: nothing ties one pose to the next
+NANOSECOND_DIGITS = 16
+REACH_S = 0.3  # offsets looked for where the clocks are said to agree
+
+
+@dataclass(frozen=True, eq=False)
+class MapSettings:
+    """What is asked for.
+
+    Parameters
+    ----------
+    size_m : side of the black square
+    dictionary : by name, or "auto"
+    reference : number of the marker at the origin, or None
+    extrinsics : where the camera sits on the IMU; without an IMU not needed
+    noise : of the IMU; None for that of a consumer's MEMS
+    offset_s : IMU time is camera time plus this; None takes that of the extrinsics, NaN finds it
+    stamps : (F,) ns of every frame by the camera's clock, or None for the source's own
+    """
+
+    size_m: float
+    dictionary: str = "auto"
+    reference: int | None = None
+    extrinsics: Extrinsics | None = None
+    noise: ImuNoise | None = None
+    offset_s: float | None = None
+    stamps: Ints | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MapJob:
+    """A map and how it came about.
+
+    Parameters
+    ----------
+    vision : the map of the camera alone, where there is an IMU
+    clock : what the turns say about the clocks, on top of the offset used
+    searched : whether the offset was found from the turns
+    """
+
+    source: str
+    settings: MapSettings
+    found: MarkerMap
+    frames: int
+    dictionary: str | None
+    vision: MarkerMap | None = None
+    clock: ClockOffset | None = None
+    offset_s: float = 0.0
+    searched: bool = False
+    left_out: tuple[str, ...] = ()
+    fault: str = ""
+    seconds: float = 0.0
+    notes: tuple[str, ...] = field(default=())
+
+
+def read_sightings(
+    source: str, camera: Camera, settings: MapSettings, say: Callable[[str], object] = lambda _: None
+) -> tuple[MarkerSightings, str | None, tuple[str, ...], str]:
+    """Markers of every frame of a source: sightings, dictionary, what was left out, and what broke off.
+
+    Raises
+    ------
+    DataError
+        where the source cannot be read, has images of another size, or another number of frames than stamps.
+    """
+    from vision3d.boards import dictionary_name
+    from vision3d.frames import open_frames
+    from vision3d.markers import find_markers
+
+    name = None if settings.dictionary == "auto" else dictionary_name(settings.dictionary)
+    rows: list[tuple[Marker, ...]] = []
+    times: list[int] = []
+    with open_frames(source) as frames:
+        if camera.size != frames.size:
+            told, given = ("x".join(map(str, one)) for one in (camera.size, frames.size))
+            raise DataError(f"the camera's file is of images of {told}, those of {source} are {given}")
+        for frame in frames:
+            markers, named = find_markers(frame.image, name or "auto", camera=camera)
+            name = name or named
+            rows.append(markers)
+            times.append(_time_of(frame, len(times)))
+            if len(rows) % 100 == 0:
+                say(f"{len(rows)}{f' of {frames.count}' if frames.count else ''} frames")
+        left_out, fault = frames.left_out, frames.fault
+    t = _stamped(np.array(times, dtype=np.int64), settings.stamps)
+    sightings = MarkerSightings.from_frames(camera, settings.size_m, zip(t.tolist(), rows, strict=True))
+    return sightings, name, left_out, fault
+
+
+def _time_of(frame: Frame, index: int) -> int:
+    """The frame's time: by its name where that is one, by its clock otherwise; photographs are far apart."""
+    from vision3d.frames.files import named_time
+
+    if frame.still:
+        return round(index * STILL_S * 1e9)
+    named = named_time(Path(frame.name).stem)
+    return frame.t_ns if named is None else named
+
+
+def _stamped(t: Ints, stamps: Ints | None) -> Ints:
+    if stamps is None:
+        return t
+    if len(stamps) != len(t):
+        raise DataError(f"there are {len(t)} frames and {len(stamps)} stamps; each frame needs one")
+    return stamps
+
+
+def read_stamps(path: Path) -> Ints:
+    """Times (F,) ns, one a line in the first column: seconds, or nanoseconds of sixteen digits and more.
+
+    Raises
+    ------
+    DataError, FileFormatError
+        naming the line.
+    """
+    from sequential.readers.files import read_text
+    from sequential.readers.stamps import stamp_s
+
+    found = []
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        word = line.replace(";", ",").split(",")[0].split()[:1]
+        if not word or word[0].startswith("#") or (number == 1 and not word[0][0].isdigit()):
+            continue
+        try:
+            whole = word[0].isdecimal() and len(word[0]) >= NANOSECOND_DIGITS
+            found.append(int(word[0]) if whole else stamp_s(word[0]))
+        except ValueError as fault:
+            raise FileFormatError(f"{path}, line {number}: {fault}") from None
+    return np.array(found, dtype=np.int64)
+
+
+def map_sightings(
+    sightings: MarkerSightings,
+    settings: MapSettings,
+    imu: ImuRecording | None = None,
+    say: Callable[[str], object] = lambda _: None,
+) -> tuple[MarkerMap, MarkerMap | None, ClockOffset | None, float]:
+    """The map; with an IMU also that of the camera alone, what the clocks say, and the offset taken.
+
+    Raises
+    ------
+    DataError
+        where camera and IMU have no time in common, or no turn tells the offset that is to be found.
+    """
+    if imu is None:
+        return map_markers(sightings, reference=settings.reference), None, None, 0.0
+    imu.require("accel", "gyro")
+    mount = settings.extrinsics
+    if mount is None:
+        raise DataError(
+            "with an IMU the mount of the camera on it is needed: --extrinsics camchain-imucam.yaml"
+        )
+    say("the map of the camera alone")
+    alone = map_markers(sightings, reference=settings.reference)
+    offset = mount.offset_s if settings.offset_s is None else settings.offset_s
+    if np.isnan(offset):
+        told = clock_offset(alone.t, alone.trajectory, mount.body_T_camera, imu)
+        if told is None:
+            raise DataError(
+                "no offset between the clocks can be found from the turns: the camera hardly turns while it "
+                "sees markers; record some brisk turns, or give --time-offset S"
+            )
+        offset = told.offset_s
+    require_overlap(sightings.t + round(offset * 1e9), imu)
+    shifted = replace(imu, t=imu.t - round(offset * 1e9))
+    clock = clock_offset(alone.t, alone.trajectory, mount.body_T_camera, shifted, reach_s=REACH_S)
+    say("the map with the IMU")
+    inertial = Inertial(imu, mount.body_T_camera, settings.noise or USUAL, offset)
+    return map_markers(sightings, inertial, reference=settings.reference), alone, clock, offset
