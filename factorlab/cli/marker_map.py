@@ -28,7 +28,7 @@ OPTIONS = (
     click.option("--time-offset", metavar="S",
                  help="With --imu: IMU time less camera time, s; auto finds it from the turns."),
     click.option("--stamps", type=FILE, metavar="FILE",
-                 help="Times of the frames, one a line: s, or ns of 16 digits and more."),
+                 help="Times of the frames: a table with one row a frame, as `live` writes it."),
     click.option("--reference", type=int, metavar="ID",
                  help="With --map: marker at the origin.  [default: the one that most hang on]"),
     click.option("--demo", is_flag=True, help="With --map: a simulated room, and its truth."),
@@ -104,11 +104,11 @@ def _require_alone(source: str | None, options: dict[str, Any]) -> None:
 def _settings(options: dict[str, Any]) -> MapSettings:
     from factorlab.cli.markers import _settings as markers_settings
     from factorlab.marker_map.extrinsics import read_extrinsics
-    from factorlab.marker_map.job import MapSettings, read_stamps
+    from factorlab.marker_map.job import MapSettings
     from sequential.readers.kalibr import read_kalibr_imu
 
     plain = markers_settings(options)
-    mount, noise, stamps = options["extrinsics"], options["imu_noise"], options["stamps"]
+    mount, noise = options["extrinsics"], options["imu_noise"]
     return MapSettings(
         plain.size_m,
         plain.dictionary,
@@ -116,7 +116,7 @@ def _settings(options: dict[str, Any]) -> MapSettings:
         None if mount is None else read_extrinsics(mount, options["which"] if _several(mount) else None),
         None if noise is None else read_kalibr_imu(noise).noise,
         _offset(options["time_offset"]),
-        None if stamps is None else read_stamps(stamps),
+        options["stamps"],
     )
 
 
@@ -148,7 +148,9 @@ def _read(source: str, options: dict[str, Any]) -> MapJob:
     settings = _settings(options)
     imu = _imu(options)
     camera = read_camera(options["camera"], which=options["which"], size=_size(source))
-    sightings, name, left_out, fault = read_sightings(source, camera, settings, _say)
+    sightings, name, left_out, fault = read_sightings(
+        source, camera, settings, timed=imu is not None, say=_say
+    )
     found, vision, clock, offset = map_sightings(sightings, settings, imu, _say)
     searched = settings.offset_s is not None and math.isnan(settings.offset_s)
     return MapJob(

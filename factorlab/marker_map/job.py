@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from factorlab.marker_map.clock import ClockOffset, clock_offset, require_overlap
 from factorlab.marker_map.mapping import USUAL, Inertial, MarkerMap, map_markers
-from sequential.errors import DataError, FileFormatError
+from sequential.errors import DataError
 from sequential.noise import ImuNoise
 from vision3d.markers.sightings import MarkerSightings
 
@@ -20,15 +20,13 @@ if TYPE_CHECKING:
     from factorlab.marker_map.extrinsics import Extrinsics
     from sequential.sensors.recording import ImuRecording
     from vision3d.camera import Camera
-    from vision3d.frames import Frame
+    from vision3d.frames import FrameSource
     from vision3d.markers import Marker
 
-__all__ = ["MapJob", "MapSettings", "map_sightings", "read_sightings", "read_stamps"]
+__all__ = ["MapJob", "MapSettings", "map_sightings", "read_sightings"]
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 STILL_S = 10.0  # photographs are that far apart: nothing ties one pose to the next
-NANOSECOND_DIGITS = 16
 REACH_S = 0.3  # offsets looked for where the clocks are said to agree
 
 
@@ -44,7 +42,7 @@ class MapSettings:
     extrinsics : where the camera sits on the IMU; without an IMU not needed
     noise : of the IMU; None for that of a consumer's MEMS
     offset_s : IMU time is camera time plus this; None takes that of the extrinsics, NaN finds it
-    stamps : (F,) ns of every frame by the camera's clock, or None for the source's own
+    stamps : table with the time of every frame by the camera's clock, or None for the source's own
     """
 
     size_m: float
@@ -53,7 +51,7 @@ class MapSettings:
     extrinsics: Extrinsics | None = None
     noise: ImuNoise | None = None
     offset_s: float | None = None
-    stamps: Ints | None = None
+    stamps: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +81,21 @@ class MapJob:
 
 
 def read_sightings(
-    source: str, camera: Camera, settings: MapSettings, say: Callable[[str], object] = lambda _: None
+    source: str,
+    camera: Camera,
+    settings: MapSettings,
+    *,
+    timed: bool,
+    say: Callable[[str], object] = lambda _: None,
 ) -> tuple[MarkerSightings, str | None, tuple[str, ...], str]:
     """Markers of every frame of a source: sightings, dictionary, what was left out, and what broke off.
+
+    `timed` asks for the times of frames, which photographs need not have.
 
     Raises
     ------
     DataError
-        where the source cannot be read, has images of another size, or another number of frames than stamps.
+        where the source cannot be read, has images of another size, or frames whose times nobody says.
     """
     from vision3d.boards import dictionary_name
     from vision3d.frames import open_frames
@@ -100,62 +105,40 @@ def read_sightings(
     rows: list[tuple[Marker, ...]] = []
     times: list[int] = []
     with open_frames(source) as frames:
-        if camera.size != frames.size:
-            told, given = ("x".join(map(str, one)) for one in (camera.size, frames.size))
-            raise DataError(f"the camera's file is of images of {told}, those of {source} are {given}")
+        size, count = frames.size, frames.count
+    if camera.size != size:
+        told, given = ("x".join(map(str, one)) for one in (camera.size, size))
+        raise DataError(f"the camera's file is of images of {told}, those of {source} are {given}")
+    opened, images = _opened(source, settings.stamps, timed=timed)
+    for t_ns, image in images:
+        markers, named = find_markers(image, name or "auto", camera=camera)
+        name = name or named
+        rows.append(markers)
+        times.append(t_ns)
+        if len(rows) % 100 == 0:
+            say(f"{len(rows)}{f' of {count}' if count else ''} frames")
+    sightings = MarkerSightings.from_frames(camera, settings.size_m, zip(times, rows, strict=True))
+    return sightings, name, opened.left_out, opened.fault
+
+
+def _opened(
+    source: str, stamps: Path | None, *, timed: bool
+) -> tuple[FrameSource, Iterator[tuple[int, NDArray[np.uint8]]]]:
+    """A source, and its frames with their times (ns); photographs without a time are far apart."""
+    from factorlab.cam_imu.stamped import open_stamped
+    from vision3d.frames import open_frames
+
+    if timed or stamps is not None:
+        stamped = open_stamped(source, stamps)
+        return stamped.source, ((t_ns, image) for _, t_ns, image in stamped.each())
+    frames = open_frames(source)
+    return frames, _far_apart(frames)
+
+
+def _far_apart(frames: FrameSource) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    with frames:
         for frame in frames:
-            markers, named = find_markers(frame.image, name or "auto", camera=camera)
-            name = name or named
-            rows.append(markers)
-            times.append(_time_of(frame, len(times)))
-            if len(rows) % 100 == 0:
-                say(f"{len(rows)}{f' of {frames.count}' if frames.count else ''} frames")
-        left_out, fault = frames.left_out, frames.fault
-    t = _stamped(np.array(times, dtype=np.int64), settings.stamps)
-    sightings = MarkerSightings.from_frames(camera, settings.size_m, zip(t.tolist(), rows, strict=True))
-    return sightings, name, left_out, fault
-
-
-def _time_of(frame: Frame, index: int) -> int:
-    """The frame's time: by its name where that is one, by its clock otherwise; photographs are far apart."""
-    from vision3d.frames.files import named_time
-
-    if frame.still:
-        return round(index * STILL_S * 1e9)
-    named = named_time(Path(frame.name).stem)
-    return frame.t_ns if named is None else named
-
-
-def _stamped(t: Ints, stamps: Ints | None) -> Ints:
-    if stamps is None:
-        return t
-    if len(stamps) != len(t):
-        raise DataError(f"there are {len(t)} frames and {len(stamps)} stamps; each frame needs one")
-    return stamps
-
-
-def read_stamps(path: Path) -> Ints:
-    """Times (F,) ns, one a line in the first column: seconds, or nanoseconds of sixteen digits and more.
-
-    Raises
-    ------
-    DataError, FileFormatError
-        naming the line.
-    """
-    from sequential.readers.files import read_text
-    from sequential.readers.stamps import stamp_s
-
-    found = []
-    for number, line in enumerate(read_text(path).splitlines(), start=1):
-        word = line.replace(";", ",").split(",")[0].split()[:1]
-        if not word or word[0].startswith("#") or (number == 1 and not word[0][0].isdigit()):
-            continue
-        try:
-            whole = word[0].isdecimal() and len(word[0]) >= NANOSECOND_DIGITS
-            found.append(int(word[0]) if whole else stamp_s(word[0]))
-        except ValueError as fault:
-            raise FileFormatError(f"{path}, line {number}: {fault}") from None
-    return np.array(found, dtype=np.int64)
+            yield round(frame.index * STILL_S * 1e9) if frame.still else frame.t_ns, frame.image
 
 
 def map_sightings(
