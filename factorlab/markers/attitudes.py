@@ -1,4 +1,8 @@
-"""From poses of a marker to readings of an attitude: both modes of a sighting, odds, covariances."""
+"""From poses of a marker to readings of an attitude, and those together with a gyro.
+
+>>> stream = attitude_readings(t, poses)  # doctest: +SKIP
+>>> run = fuse_attitude(ExtendedKalmanFilter(), gyro, stream, noise)  # doctest: +SKIP
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,22 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sequential.errors import DataError, ShapeError
-from sequential.log import Stream, nanoseconds
-from sequential.models import two_mode_readings
+from sequential.log import SensorLog, Stream, nanoseconds
+from sequential.manifold import SO3, Product, Vector
+from sequential.model import Gaussian, StateSpace
+from sequential.models import GyroAttitude, TwoModeOrientation, two_mode_readings
+from sequential.noise import ImuNoise
+from sequential.run import run
 
 if TYPE_CHECKING:
+    from sequential.history import Run
+    from sequential.run import Estimator
     from vision3d.markers import MarkerPose
 
-__all__ = ["attitude_readings"]
+__all__ = ["attitude_readings", "fuse_attitude"]
 
 
 def attitude_readings(t: ArrayLike, poses: Sequence[MarkerPose | None]) -> Stream:
@@ -48,3 +58,70 @@ def attitude_readings(t: ArrayLike, poses: Sequence[MarkerPose | None]) -> Strea
         [a.cov[:3, :3] for a, _ in modes],
         [b.cov[:3, :3] for _, b in modes],
     )
+
+
+def fuse_attitude(
+    estimator: Estimator,
+    gyro: Stream,
+    marker: Stream,
+    noise: ImuNoise,
+    *,
+    bias_sigma: float = 0.1,
+    mount_sigma: float = 0.0,
+    at: NDArray[np.int64] | None = None,
+) -> Run:
+    """Attitude of a body that carries a gyro and a marker (or a camera that sees one), and the gyro's bias.
+
+    Begun once from each mode of the first sighting; the run with the higher likelihood is returned.
+
+    Parameters
+    ----------
+    estimator : any filter, smoother or graph
+    gyro : (N, 3) rad/s; samples are averaged in pairs, which makes their integration second order in dt
+    marker : of `attitude_readings`
+    noise : of the gyro
+    bias_sigma : of the gyro's bias about zero before anything is known, rad/s
+    mount_sigma : how far the marker's axes may be turned from the gyro's, rad; zero is not at all
+    at : further times of estimates, ns
+
+    Returns
+    -------
+    Run
+        of a product state with the parts `attitude` and `gyro_bias`, and `mount` where it is sought.
+
+    Raises
+    ------
+    ModelError, MissingStreamError, GapError
+    """
+    first, others = marker.select(np.arange(1)), marker.select(np.arange(1, len(marker)))
+    rates = Stream(gyro.t[:-1], 0.5 * (gyro.values[1:] + gyro.values[:-1]))
+    log, known = SensorLog({"gyro": rates, "marker": others}), first.keys()[0]
+    runs = []
+    for q in (known[:4], known[4:8]):
+        if q.any():
+            model = _declare(first, q, noise, bias_sigma, mount_sigma)
+            runs.append(run(estimator, model, log, at=at))
+    return max(runs, key=lambda one: one.log_likelihood)
+
+
+def _declare(
+    first: Stream, q: NDArray[np.float64], noise: ImuNoise, bias_sigma: float, mount_sigma: float
+) -> StateSpace:
+    """Attitude and bias from a first sighting, with the marker's mount where it is unknown."""
+    free = mount_sigma > 0.0
+    mount = {"mount": SO3()} if free else {}
+    state = Product(attitude=SO3(), gyro_bias=Vector(3), **mount)
+    mean, cov = state.identity(), np.zeros((state.dim, state.dim))
+    mean[:4] = q
+    cov[np.arange(3, 6), np.arange(3, 6)] = bias_sigma**2
+    seen = np.asarray(first.noise_cov)[0]
+    cov[:3, :3] = seen
+    if free:  # the first sighting says where the marker is, and that the body is so far off it
+        cov[np.arange(6, 9), np.arange(6, 9)] = mount_sigma**2
+        cov[:3, :3] += mount_sigma**2 * np.eye(3)
+        cov[:3, 6:] = cov[6:, :3] = -(mount_sigma**2) * np.eye(3)
+    sensor = TwoModeOrientation(seen, mount="mount" if free else None)
+    return StateSpace(
+        state, Gaussian(mean, cov), GyroAttitude(noise), {"marker": sensor}, "gyro",
+        start=int(first.t[0]), static=tuple(mount), check=False,
+    )  # fmt: skip
