@@ -16,11 +16,13 @@ from factorlab.datasets.city10000 import load_city10000
 from factorlab.datasets.dataset import Dataset, Truth
 from factorlab.datasets.kitti import load_kitti
 from factorlab.datasets.mrclam import load_mrclam
+from factorlab.datasets.planar_monocular import load_planar_monocular
 from factorlab.datasets.plaza import load_plaza
 from factorlab.datasets.pose_graphs import load_intel, load_mit, load_sphere2500, load_w10000
 from factorlab.datasets.rail import load_rail
 from factorlab.datasets.slam import SlamDataset
 from factorlab.datasets.starry_night import load_starry_night
+from factorlab.datasets.victoria_park import load_victoria_park
 from sequential.errors import DataError
 
 __all__ = ["NAMES", "SLAM_NAMES", "Dataset", "SlamDataset", "Truth", "load", "load_slam"]
@@ -41,6 +43,8 @@ _SLAM_LOADERS: dict[str, Callable[[Path | None, int | None], list[SlamDataset]]]
     "sphere2500": lambda data, _robot: load_sphere2500(data),
     "w10000": lambda data, _robot: [load_w10000(data)],
     "city10000": lambda data, _robot: [load_city10000(data)],
+    "victoria_park": lambda data, _robot: load_victoria_park(data),
+    "planar_monocular": lambda data, _robot: load_planar_monocular(data),
 }
 SLAM_NAMES = tuple(_SLAM_LOADERS)
 

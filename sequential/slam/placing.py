@@ -9,7 +9,7 @@ leaves the depth of a point, measurements wait until several together determine 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ __all__ = ["Arrivals", "Placing", "place_all"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+LOOSE = 2.0  # bend of a variable that begins only because nothing more will come
 Row = tuple[int, int]  # number of the group, row in it
 
 
@@ -48,6 +49,7 @@ class Placing:
     several: Several = field(default_factory=Several)
     _values: dict[str, dict[int, Array]] = field(init=False, repr=False)
     _waiting: dict[tuple[str, int], list[Row]] = field(init=False, default_factory=dict, repr=False)
+    _drift: dict[tuple[str, int], Array] = field(init=False, default_factory=dict, repr=False)
     _again: dict[tuple[str, int], int] = field(init=False, default_factory=dict, repr=False)
     _rows: list[list[Row]] = field(init=False, repr=False)
     _index: list[Ints] = field(init=False, repr=False)
@@ -80,6 +82,7 @@ class Placing:
     def correct(self, kind: str, index: int, value: Array) -> None:
         """Take an estimator's better value; what is placed from now on is placed by it."""
         self._values[kind][index] = value
+        self._drift.pop((kind, index), None)
 
     def values(self) -> Values:
         """All variables that have begun."""
@@ -100,6 +103,20 @@ class Placing:
         for who in {self._missing(row)[0] for row in rows if len(self._missing(row)) == 1}:
             self._determine(who, begun, ready)
         return Arrivals(tuple(begun), tuple(ready))
+
+    def begin_poorly(self) -> bool:
+        """Begin what still waits wherever its measurements fit at all; whether that began anything.
+
+        For the end of a recording: more will not come, and poses are as good as they get.
+        """
+        begun: list[tuple[str, int]] = []
+        several = self.several
+        self.several = replace(several, bend=LOOSE, margin=0.0)
+        self._again.clear()
+        for who in list(self._waiting):
+            self._determine(who, begun, [])
+        self.several = several
+        return bool(begun)
 
     def _take(self, row: Row, begun: list[tuple[str, int]], ready: list[Row]) -> bool:
         """Whether a measurement is ready, after placing by it what it determines alone."""
@@ -144,17 +161,40 @@ class Placing:
         if not np.isfinite(placed).all():
             return False
         self._values[who[0]][who[1]] = placed[0]
+        self._note_drift(row, who)
         return True
+
+    def _note_drift(self, row: Row, who: tuple[str, int]) -> None:
+        """A pose by odometry is as uncertain as the one before and the odometry together."""
+        group = self.problem.factors[row[0]]
+        if len(group.slots) == 2 and group.slots[0] == group.slots[1]:
+            named = zip(group.slots, self._index[row[0]][row[1]].tolist(), strict=True)
+            (other,) = (one for one in named if one != who)
+            noise = np.asarray(group.noise_cov)
+            step = noise[row[1]] if noise.ndim == 3 else noise
+            self._drift[who] = step + self._drift.get(other, 0.0)
 
     def _reading(self, number: int, at: list[int], who: tuple[str, int]) -> Reading:
         """Measurements of a group as they speak of one variable, in the same slot of each."""
         group, index = self.problem.factors[number], self._index[number][at]
         slot = list(zip(group.slots, index[0].tolist(), strict=True)).index(who)
+        drift = tuple(
+            None if k == slot else self._drifts(kind, index[:, k]) for k, kind in enumerate(group.slots)
+        )
         values = tuple(
             None if k == slot else np.stack([self._values[kind][i] for i in index[:, k].tolist()])
             for k, kind in enumerate(group.slots)
         )
-        return Reading(group.model, slot, self._z[number][at], values, group.covs()[at])
+        return Reading(group.model, slot, self._z[number][at], values, group.covs()[at], drift)
+
+    def _drifts(self, kind: str, index: Ints) -> Array | None:
+        """How uncertain variables (N) are relative to the last of them: (N, d, d), or None."""
+        own = [self._drift.get((kind, i)) for i in index.tolist()]
+        if all(cov is None for cov in own):
+            return None
+        d = self.problem.kinds[kind].dim
+        gathered = np.stack([np.zeros((d, d)) if cov is None else cov for cov in own])
+        return gathered[-1] - gathered if len(gathered) > 1 else None
 
     def _wait(self, row: Row) -> None:
         for who in self._missing(row):

@@ -39,7 +39,8 @@ class BatchSlam:
     Parameters
     ----------
     initial : where to begin: `"steps"`, each variable placed by the first measurement that determines it;
-        `"given"`, the problem's `start`; `"lago"`, `"chordal"`, `"tree"` or `"odometry"`, poses by
+        `"given"`, the problem's `start`; `"incremental"`, the same with solves on the way;
+        `"lago"`, `"chordal"`, `"tree"` or `"odometry"`, poses by
         `sequential.slam.initial` and the rest placed from them; a function of the problem; or `Values`
     method : `"gauss_newton"`, which goes over to Levenberg-Marquardt where the cost would rise;
         `"levenberg_marquardt"`, or `"dogleg"`

@@ -43,9 +43,17 @@ def from_poses(method: str) -> Beginning:
     return begin
 
 
+def incremental(problem: SlamProblem) -> Values:
+    """Grown as the measurements arrive, with solves on the way."""
+    from factorlab.graph.slam.growing import grown
+
+    return grown(problem)
+
+
 INITIAL: dict[str, Beginning] = {
     "steps": placed,
     "given": given,
+    "incremental": incremental,
     **{method: from_poses(method) for method in METHODS},
 }
 

@@ -65,6 +65,7 @@ def native_factors(group: Factors, loss: Loss | None = None) -> list[Any] | None
 
 def lowered(model: FactorModel) -> NativeFactor | None:
     """The registry's answer, with every room registered."""
+    import factorlab.graph.slam.floor_factors
     import factorlab.graph.slam.planar_factors
     import factorlab.graph.slam.spatial_factors  # noqa: F401
 
