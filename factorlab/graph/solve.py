@@ -131,22 +131,25 @@ def optimise(
     max_iterations: int = 50,
     *,
     check: bool = True,
+    ordering: Any = None,
 ) -> Solved:
     """Gauss-Newton, and Levenberg-Marquardt from where it began if the cost would not fall.
+
+    `ordering` is of the elimination, for a graph whose structure is known; GTSAM finds one otherwise.
 
     Raises
     ------
     UnderConstrainedError, NotConvergedError, SolverError
     """
     with readable(problem):
-        solved = gauss_newton(graph, start, max_iterations)
+        solved = gauss_newton(graph, start, max_iterations, *([] if ordering is None else [ordering]))
         if solved is None:
             values, cost, iterations = damped(graph, start, max_iterations)
             solved = Solved(values, cost, iterations, newton_decrement(graph.linearize(values), problem))
     return solved.checked() if check else solved
 
 
-def gauss_newton(graph: Any, values: Any, max_iterations: int) -> Solved | None:
+def gauss_newton(graph: Any, values: Any, max_iterations: int, *ordering: Any) -> Solved | None:
     """Gauss-Newton until a step promises next to nothing; None where a step would raise the cost.
 
     The loop is ours and all the work GTSAM's: each solve proves full rank and prices its own step, so that
@@ -154,7 +157,7 @@ def gauss_newton(graph: Any, values: Any, max_iterations: int) -> Solved | None:
     """
     cost, decrement, iteration = graph.error(values), float("inf"), 0
     while iteration < max_iterations and decrement > ENOUGH * (1.0 + cost):
-        step, decrement = priced_step(graph.linearize(values))
+        step, decrement = priced_step(graph.linearize(values), *ordering)
         values = values.retract(step)
         before, cost = cost, graph.error(values)
         iteration += 1

@@ -20,7 +20,7 @@ from sequential.slam.models.relative import Between
 from sequential.slam.placing import place_all
 from sequential.slam.problem import Factors, SlamProblem
 
-__all__ = ["Beginning", "able", "in_order", "placed", "who"]
+__all__ = ["Able", "Beginning", "in_order", "placed", "who"]
 
 Ints = NDArray[np.int64]
 Variable = tuple[str, int]
@@ -49,8 +49,21 @@ def in_order(problem: SlamProblem) -> tuple[Ints, Ints, Ints]:
     return steps[order], groups[order], rows[order]
 
 
-def able(group: Factors, slot: int) -> bool:
-    """Whether the model of a group can place that slot at all."""
+class Able:
+    """Whether the model of a group can place one of its slots at all; found out when first asked."""
+
+    def __init__(self, problem: SlamProblem) -> None:
+        self.problem = problem
+        self.known: dict[tuple[int, int], bool] = {}
+
+    def __call__(self, g: int, slot: int) -> bool:
+        """Of group number g."""
+        if (g, slot) not in self.known:
+            self.known[g, slot] = _able(self.problem.factors[g], slot)
+        return self.known[g, slot]
+
+
+def _able(group: Factors, slot: int) -> bool:
     known = [None if k == slot else m.identity()[None] for k, m in enumerate(group.model.manifolds)]
     for row in {0, len(group) // 2, len(group) - 1}:
         try:
@@ -113,10 +126,7 @@ def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning] | None:
     if problem.start is not None:
         known = {(kind, i) for kind, index in problem.start.index.items() for i in index.tolist()}
     columns = [np.asarray(group.index).tolist() for group in problem.factors]
-    capable = [
-        {k for k in range(len(group.slots)) if len(group) and k != group.unknown and able(group, k)}
-        for group in problem.factors
-    ]
+    capable = Able(problem)
     begun: dict[Variable, Beginning] = {}
     waiting: list[tuple[int, int]] = []
     _, groups, rows = in_order(problem)
@@ -130,7 +140,7 @@ def _beginnings(problem: SlamProblem) -> dict[Variable, Beginning] | None:
                 for k, (slot, i) in enumerate(zip(group.slots, columns[g][row], strict=True))
                 if k != group.unknown and (slot, i) not in known
             ]
-            if len(missing) == 1 and missing[0][0] in capable[g] and group.unknown is None:
+            if len(missing) == 1 and group.unknown is None and capable(g, missing[0][0]):
                 slot, variable = missing[0]
                 begun[variable] = Beginning(g, row, slot)
                 known.add(variable)

@@ -15,6 +15,7 @@ from factorlab.graph.slam.checks import check_problem
 from factorlab.graph.slam.initial import initial_values
 from factorlab.graph.slam.lowering import native_factors
 from factorlab.graph.slam.marginals import marginals
+from factorlab.graph.slam.marker_graph import MarkerGraph, marker_graph
 from factorlab.graph.slam.rows import Rows
 from factorlab.graph.slam.sparse import solve_rows
 from factorlab.graph.slam.variables import insert_values, read_values, type_of
@@ -23,8 +24,9 @@ from sequential.errors import ModelError
 from sequential.history import Report
 from sequential.model import Loss
 from sequential.slam import SlamProblem, SlamRun, Values
+from sequential.slam.models import MarkerCorners
 
-__all__ = ["BatchSlam", "native_graph"]
+__all__ = ["BatchSlam", "NativeGraph", "native_graph"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,25 +94,26 @@ class BatchSlam:
         if graph is None:
             built, solved = self._batched(problem, start, index)
         else:
-            built, solved = self._native(problem, graph, start, index)
+            built, solved = self._native(graph, start, index)
         finished = time.perf_counter()
         clock = {"initial_s": placed - began, "build_s": built - placed, "solve_s": finished - built}
         return self._run(problem, solved, index, clock, native=graph is not None)
 
     def _native(
-        self, problem: SlamProblem, graph: Any, start: Values, index: dict[str, Ints]
+        self, native: NativeGraph | MarkerGraph, start: Values, index: dict[str, Ints]
     ) -> tuple[float, Solved]:
-        values = insert_values(problem, start)
+        values, graph = native.insert(start), native.graph
         built = time.perf_counter()
         if self.method == "gauss_newton":
-            solved = optimise(graph, values, None, self.max_iterations, check=False)
+            order = native.ordering(values)
+            solved = optimise(graph, values, None, self.max_iterations, check=False, ordering=order)
         else:
             with readable():
                 found, cost, steps = (damped if self.method == "levenberg_marquardt" else dogleg)(
                     graph, values, self.max_iterations
                 )
             solved = Solved(found, cost, steps, newton_decrement(graph.linearize(found)))
-        back = read_values(problem, solved.values, index)
+        back = native.read(solved.values, index)
         return built, Solved(back, solved.cost, solved.iterations, solved.decrement)
 
     def _batched(self, problem: SlamProblem, start: Values, index: dict[str, Ints]) -> tuple[float, Solved]:
@@ -149,10 +152,31 @@ class BatchSlam:
         return SlamRun(solved.values, covs, dict(problem.kinds), report)
 
 
-def native_graph(problem: SlamProblem, loss: Loss | None = None) -> Any | None:
+class NativeGraph:
+    """A problem as a native graph, variable for variable."""
+
+    def __init__(self, problem: SlamProblem, graph: Any) -> None:
+        self.problem, self.graph = problem, graph
+
+    def ordering(self, values: Any) -> Any:
+        """Whatever GTSAM finds."""
+        return None
+
+    def insert(self, values: Values) -> Any:
+        """As `gtsam.Values`."""
+        return insert_values(self.problem, values)
+
+    def read(self, source: Any, index: dict[str, Ints]) -> Values:
+        """Back to ours."""
+        return read_values(self.problem, source, index)
+
+
+def native_graph(problem: SlamProblem, loss: Loss | None = None) -> NativeGraph | MarkerGraph | None:
     """The measurements as a `gtsam.NonlinearFactorGraph`, or None where a piece has no native form."""
     if any(type_of(problem.kinds[kind]) is None for kind in problem.kinds):
         return None
+    if any(isinstance(group.model, MarkerCorners) for group in problem.factors):
+        return marker_graph(problem, loss)
     graph = gtsam.NonlinearFactorGraph()
     for group in problem.factors:
         factors = native_factors(group, loss)
@@ -160,7 +184,7 @@ def native_graph(problem: SlamProblem, loss: Loss | None = None) -> Any | None:
             return None
         for factor in factors:
             graph.push_back(factor)
-    return graph
+    return NativeGraph(problem, graph)
 
 
 def dogleg(graph: Any, start: Any, max_iterations: int) -> tuple[Any, float, int]:

@@ -21,7 +21,7 @@ from factorlab.graph.slam.variables import SHIFT, keys_of, require_type
 from sequential.errors import ModelError, UnderConstrainedError
 from sequential.model import Loss
 from sequential.slam import SlamProblem
-from sequential.slam.beginnings import able, in_order, who
+from sequential.slam.beginnings import Able, in_order, who
 from sequential.slam.determined import Reading, Several, determined
 from sequential.slam.models import Between
 
@@ -75,7 +75,7 @@ class Feed:
             list(zip(*(keys_of(s, np.asarray(g.index)[:, k]) for k, s in enumerate(g.slots)), strict=True))
             for g in problem.factors
         ]
-        self.able = [{k for k in range(len(g.slots)) if len(g) and able(g, k)} for g in problem.factors]
+        self.able = Able(problem)
         self.types = {ord(kind): require_type(m, kind) for kind, m in problem.kinds.items()}
         self.chained = [
             self.types[ord(g.slots[0])].to_gtsam(np.asarray(g.z)) if isinstance(g.model, Between) else None
@@ -87,6 +87,7 @@ class Feed:
         self.dropped = 0
         self.waiting: list[Measurement] = []
         self.again: dict[int, int] = {}
+        self.newest: dict[int, Any] = {}  # what the engine was asked for last
 
     def _given(self) -> dict[int, Any]:
         """Values that the problem brings, by key; each enters with its first measurement."""
@@ -154,7 +155,7 @@ class Feed:
             for k in [k for k in missing if keys[k] in self.begun]:
                 self._enter(step, keys[k], self.begun[keys[k]])
                 missing.remove(k)
-            if len(missing) == 1 and missing[0] in self.able[g]:
+            if len(missing) == 1 and self.able(g, missing[0]):
                 placed = self._place(step, g, row, missing[0], keys)
                 if placed is not None:
                     self._enter(step, keys[missing.pop()], placed)
@@ -186,7 +187,9 @@ class Feed:
 
     def _now(self, step: Step, key: int) -> Any:
         """What is believed of a variable, or what it was begun with in this very step."""
-        return step.new[key] if key in step.new else self.believed(key)
+        if key in step.new:
+            return step.new[key]
+        return self.newest[key] if key in self.newest else self.believed(key)
 
     def _row(self, step: Step, key: int) -> Array:
         return np.array(self.types[key >> SHIFT].to_row(self._now(step, key)), dtype=np.float64)

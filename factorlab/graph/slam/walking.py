@@ -53,6 +53,7 @@ class Walk:
             if newest >= 0:
                 self.numbers.append(step.number)
                 self.believed.append(believed(newest))
+                self.feed.newest = {newest: self.believed[-1]}
             self.each.append(clock() - began)
             if self.online and newest >= 0:
                 self.covs.append(self.engine.marginalCovariance(newest))
@@ -71,8 +72,10 @@ class Walk:
         }
         cost, message, settled = float("nan"), "", True
         if solved is not None:
-            details |= {"chi2": 2.0 * solved.cost, "newton_decrement": solved.decrement}
-            cost, message, settled = solved.cost, solved.message(), solved.settled
+            details["chi2"], cost = 2.0 * solved.cost, solved.cost
+            if np.isfinite(solved.decrement):
+                details["newton_decrement"] = solved.decrement
+                message, settled = solved.message(), solved.settled
         return Report(
             name, settled, self.steps, self.seconds, cost, message, rejected=dropped, details=details
         )
