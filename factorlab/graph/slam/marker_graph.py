@@ -77,7 +77,8 @@ def marker_graph(problem: SlamProblem, loss: Loss | None = None) -> MarkerGraph 
     if len(kinds) != 1 or loss is not None:
         return None
     (kind,) = kinds
-    graph, points = gtsam.NonlinearFactorGraph(), {}
+    graph = gtsam.NonlinearFactorGraph()
+    points: dict[int, Array] = {}
     sides: dict[float, int] = {}
     for group in problem.factors:
         if isinstance(group.model, MarkerCorners):
