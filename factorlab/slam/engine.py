@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from factorlab.compare.verdict import Finding
 from factorlab.datasets.slam import SlamDataset
 from factorlab.slam.estimators import KINDS, make, require_names
-from factorlab.slam.lags import LagPoint, slam_lag_sweep
+from factorlab.slam.lags import STEP_NS, LagPoint, slam_lag_sweep
 from factorlab.slam.scores import MapScore, Scores, map_score_of, scores_of
 from sequential.errors import FactorlabError
 from sequential.history import Run
@@ -70,6 +70,7 @@ class SlamRow:
             "seconds": self.seconds,
             "us_per_measurement": self.us_per_measurement,
             "latency": KINDS[self.name].latency,
+            "step_worst_s": None if self.run is None else self.run.report.details.get("step_worst_s"),
             "iterations": self.iterations,
             "converged": self.converged,
             "message": self.message,
@@ -164,7 +165,7 @@ def compare_slam(
 
 def _timed(name: str, dataset: SlamDataset) -> tuple[SlamRun, float]:
     """A solve, and the median of the estimator's own seconds over warm solves where these are quick."""
-    estimator = make(name, dataset.graph_options)
+    estimator = make(name, dataset.graph_options, covariance=_wanted(dataset))
     began = time.perf_counter()
     run = estimator.solve(dataset.problem)
     times = [run.report.seconds]
@@ -173,11 +174,25 @@ def _timed(name: str, dataset: SlamDataset) -> tuple[SlamRun, float]:
     return run, float(np.median(times[1:] or times))
 
 
+def _wanted(dataset: SlamDataset) -> bool | tuple[str, ...]:
+    """Kinds whose covariances have a use: all where a truth can judge them, else landmarks, for the map."""
+    if dataset.truth is not None and dataset.aligned == "none":
+        return True
+    return ("l",) if "l" in dataset.problem.kinds else False
+
+
 def times_of(dataset: SlamDataset, steps: NDArray[np.int64]) -> NDArray[np.int64]:
     """ns of steps; a problem without times counts a second a step."""
     if dataset.problem.t is None:
-        return np.asarray(steps, dtype=np.int64) * 1_000_000_000
+        return np.asarray(steps, dtype=np.int64) * STEP_NS
     return np.asarray(dataset.problem.t)[steps]
+
+
+def timed(dataset: SlamDataset, online: Run | None) -> Run | None:
+    """An online run at the times of `times_of`: without times an estimator counts steps."""
+    if online is None or dataset.problem.t is not None:
+        return online
+    return replace(online, t=times_of(dataset, online.t))
 
 
 def _stand_in(dataset: SlamDataset, solved: Mapping[str, SlamRun | str]) -> Run | None:
@@ -204,7 +219,7 @@ def _row(
     if isinstance(run, str):
         return SlamRow(name, message=run)
     final = kind.part == "final" or run.online is None
-    path = run.trajectory(times_of(dataset, run.values.index["x"])) if final else run.online
+    path = run.trajectory(times_of(dataset, run.values.index["x"])) if final else timed(dataset, run.online)
     assert path is not None  # noqa: S101 - an online estimator keeps what it believed
     scored = scores_of(dataset, path, stand_in, seed, "the batch")
     chi2 = run.report.details.get("chi2") if kind.part == "final" else None

@@ -66,8 +66,21 @@ def require_names(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def make(name: str, options: Mapping[str, Any], lag: float = LAG_STEPS) -> SlamEstimator:
-    """The estimator behind a pass; `options` are a dataset's for its graphs, `lag` is counted in steps."""
+def make(
+    name: str,
+    options: Mapping[str, Any],
+    lag: float = LAG_STEPS,
+    *,
+    covariance: bool | tuple[str, ...] = True,
+) -> SlamEstimator:
+    """The estimator behind a pass.
+
+    Parameters
+    ----------
+    options : a dataset's, for its batch graphs
+    lag : steps of a window
+    covariance : kinds whose marginals are wanted; online ones of the newest pose with True only
+    """
     if name == "ekf_slam":
         from sequential.slam import EkfSlam
 
@@ -75,12 +88,14 @@ def make(name: str, options: Mapping[str, Any], lag: float = LAG_STEPS) -> SlamE
     from factorlab.graph.slam import BatchSlam, FixedLagSlam, IncrementalSlam
     from sequential.model import Loss
 
+    online = covariance is True
     if name == "fixed_lag":
-        return FixedLagSlam(lag=lag)
+        return FixedLagSlam(lag=lag, online=online)
     if name == "isam2":
-        return IncrementalSlam()
+        return IncrementalSlam(online=online, covariance=covariance)
     if name == "gnc":
         from factorlab.graph.slam.gnc import GncSlam
 
-        return GncSlam()
-    return BatchSlam(**options, loss=Loss("cauchy", 2.385) if name == "batch_robust" else None)
+        return GncSlam(covariance=covariance)
+    loss = Loss("cauchy", 2.385) if name == "batch_robust" else None
+    return BatchSlam(**options, loss=loss, covariance=covariance)

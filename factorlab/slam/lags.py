@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from factorlab.datasets.slam import SlamDataset
@@ -14,6 +14,7 @@ from sequential.history import Run
 
 __all__ = ["LAGS", "LagPoint", "slam_lag_sweep"]
 
+STEP_NS = 1_000_000_000  # a problem without times counts a second a step
 LAGS = (2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 
@@ -59,7 +60,8 @@ def _point(dataset: SlamDataset, lag: float, stand_in: Run | None, seed: int) ->
     except FactorlabError as error:
         return LagPoint(lag, None, None, None, " ".join(str(error).split()))
     assert run.online is not None  # noqa: S101 - a fixed lag keeps what it believed
-    scores: Scores | None = scores_of(dataset, run.online, stand_in, seed, "the batch")
+    path = run.online if dataset.problem.t is not None else replace(run.online, t=run.online.t * STEP_NS)
+    scores: Scores | None = scores_of(dataset, path, stand_in, seed, "the batch")
     honest = None if scores is None else scores.honesty
     return LagPoint(
         lag,
