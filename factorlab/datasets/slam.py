@@ -30,6 +30,7 @@ class SlamDataset:
     reference : figures others reached on the same data, by name: {"chi2": 45.0042}
     notes : one sentence each about what a reader of a result should know
     default_estimators : names for a comparison that names none
+    isam_every : steps between relinearisations of iSAM2: 1 unless the graph is large
     graph_options : keyword arguments for graph estimators, such as {"initial": "lago"}
     """
 
@@ -43,5 +44,6 @@ class SlamDataset:
     reference: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     default_estimators: tuple[str, ...] = ("ekf_slam", "isam2", "isam2_final", "fixed_lag", "batch")
+    isam_every: int = 1
     graph_options: Mapping[str, object] = field(default_factory=dict)
     build: Callable[..., SlamProblem] | None = None

@@ -165,7 +165,7 @@ def compare_slam(
 
 def _timed(name: str, dataset: SlamDataset) -> tuple[SlamRun, float]:
     """A solve, and the median of the estimator's own seconds over warm solves where these are quick."""
-    estimator = make(name, dataset.graph_options, covariance=_wanted(dataset))
+    estimator = make(name, dataset.graph_options, covariance=_wanted(dataset), every=dataset.isam_every)
     began = time.perf_counter()
     run = estimator.solve(dataset.problem)
     times = [run.report.seconds]

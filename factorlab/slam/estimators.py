@@ -72,6 +72,7 @@ def make(
     lag: float = LAG_STEPS,
     *,
     covariance: bool | tuple[str, ...] = True,
+    every: int = 1,
 ) -> SlamEstimator:
     """The estimator behind a pass.
 
@@ -79,6 +80,7 @@ def make(
     ----------
     options : a dataset's, for its batch graphs
     lag : steps of a window
+    every : steps between relinearisations of iSAM2
     covariance : kinds whose marginals are wanted; online ones of the newest pose with True only
     """
     if name == "ekf_slam":
@@ -92,7 +94,7 @@ def make(
     if name == "fixed_lag":
         return FixedLagSlam(lag=lag, online=online)
     if name == "isam2":
-        return IncrementalSlam(online=online, covariance=covariance)
+        return IncrementalSlam(every=every, online=online, covariance=covariance)
     if name == "gnc":
         from factorlab.graph.slam.gnc import GncSlam
 
