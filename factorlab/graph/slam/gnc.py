@@ -24,6 +24,7 @@ from factorlab.graph.slam.weighted import Weighted
 from factorlab.graph.solve import Solved
 from sequential.errors import DataError, ModelError, UnderConstrainedError
 from sequential.history import Report
+from sequential.manifold import SE2, SE3
 from sequential.slam import Factors, SlamProblem, SlamRun, Values
 
 __all__ = ["GncResult", "GncSlam", "is_doubted"]
@@ -60,10 +61,11 @@ class GncSlam:
     loss : `"tls"`, truncated least squares; `"gm"`, Geman-McClure; `"dcs"`, dynamic covariance scaling, which
         is not graduated
     confidence : an outlier lies beyond this quantile of χ²
-    doubted : names of the groups that may hold outliers; by default loop closures: measurements of two moving
-        variables of one kind that are not neighbours.  All others are known inliers
-    initial : a start as of `BatchSlam`, tried beside `"trusted"`: what the trusted measurements alone say.
-        The lower robust cost wins
+    doubted : names of the groups that may hold outliers; by default loop closures: measurements of two
+        moving variables of one kind that are not neighbours.  All others are known inliers
+    initial : a start as of `BatchSlam`, tried beside what the trusted measurements alone say; the lower
+        robust cost wins.  `"relaxed"` is LAGO in the plane and the chordal relaxation in space, where there
+        are poses to relax and it fits half of what is doubted; `"trusted"` tries nothing else
     reconsider : with `"tls"`, drop or add single measurements afterwards while that lowers the cost; where
         what is believed fits √10 times better than its σ say, bounds shrink to √10 times what is fitted
     covariance : marginals of all kinds, of the named kinds, or none
@@ -74,7 +76,7 @@ class GncSlam:
     loss: str = "tls"
     confidence: float = 0.99
     doubted: tuple[str, ...] | None = None
-    initial: str | Values | Callable[[SlamProblem], Values] = "trusted"
+    initial: str | Values | Callable[[SlamProblem], Values] = "relaxed"
     reconsider: bool = True
     covariance: bool | tuple[str, ...] = True
     max_iterations: int = 100
@@ -108,7 +110,9 @@ class GncSlam:
         doubts = self._doubts(problem)
         rows = Weighted(problem, index, doubts, self.confidence)
         tried = []
-        for start in self._starts(problem, doubts):
+        for number, start in enumerate(self._starts(problem, doubts)):
+            if number and self.initial == "relaxed" and not rows.plausible(start):
+                continue  # outliers have spoilt a relaxation, which believes them all
             values, outer = self._graduate(rows, start)
             if self.reconsider and self.loss == "tls":
                 values = reconsidered(rows, values, SCHEDULES[self.loss])
@@ -151,7 +155,9 @@ class GncSlam:
             starts.append(initial_values(sure, "steps", index))
         except (UnderConstrainedError, DataError):  # the trusted measurements do not reach every variable
             starts.append(initial_values(problem, "steps", index))
-        if self.initial != "trusted":
+        if self.initial == "relaxed":
+            starts += _relaxed(problem, index)
+        elif self.initial != "trusted":
             starts.append(initial_values(problem, self.initial, index))
         return starts
 
@@ -211,6 +217,17 @@ def is_doubted(problem: SlamProblem, group: Factors) -> Flags:
         return np.zeros(len(group), dtype=np.bool_)
     index = np.asarray(group.index)
     return np.asarray(np.abs(index[:, 0] - index[:, 1]) > 1)
+
+
+def _relaxed(problem: SlamProblem, index: dict[str, NDArray[np.int64]]) -> list[Values]:
+    """The start from a linear relaxation of all measurements, or nothing where there is none."""
+    pose = problem.kinds.get("x")
+    if not isinstance(pose, SE2 | SE3):
+        return []
+    try:
+        return [initial_values(problem, "lago" if isinstance(pose, SE2) else "chordal", index)]
+    except (ModelError, UnderConstrainedError):
+        return []
 
 
 def _trusted(problem: SlamProblem, doubts: list[Flags]) -> SlamProblem:

@@ -124,6 +124,10 @@ class Weighted:
             columns = np.concatenate([np.arange(one.start, one.stop) for one in slices])
             found[k] = error[n], slope[n], columns
 
+    def plausible(self, values: Values) -> bool:
+        """Whether at least half of what is doubted lies within its bound."""
+        return not self.count or float(np.median(self.squared(values) / self.bound)) < 1.0
+
     def robust_cost(self, values: Values, schedule: Schedule) -> float:
         """Twice the cost of what is trusted, and what the schedule makes of the rest."""
         now = self._weights
