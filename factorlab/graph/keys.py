@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gtsam.symbol_shorthand import B, L, V, X
 
-__all__ = ["STATIC", "B", "L", "S", "V", "X", "name_of"]
+__all__ = ["STATIC", "WALKING", "B", "L", "S", "V", "X", "name_of", "walking"]
 
 import gtsam
 
@@ -15,6 +15,13 @@ def S(index: int) -> int:  # noqa: N802 - a symbol, like its neighbours
 
 
 STATIC = S(0)
+WALKING = "cdefghij"
+"""Letters of parts that walk beside a navigation state."""
+
+
+def walking(part: int, index: int) -> int:
+    """Key of the walking part number `part` at node `index`."""
+    return int(gtsam.symbol(WALKING[part], index))
 
 
 def name_of(key: int) -> str:

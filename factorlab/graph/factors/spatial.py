@@ -1,22 +1,22 @@
-"""A body in space that follows its twist, as BetweenFactorPose3, with a stereo camera, and positions."""
+"""A body in space that follows its twist, or drifts, as BetweenFactorPose3, with sensors of its pose."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
-from factorlab.graph.factors.inertial import flat_pose, pose3
+from factorlab.graph.factors.inertial import flat_pose
+from factorlab.graph.factors.pose_sensors import Body, pose3, pose_factor, seen_landmarks
 from factorlab.graph.keys import L, X
 from factorlab.graph.native import NativeGraph, native_process, noise_model
 from factorlab.graph.solve import certain_move
 from sequential.compile import compiled
 from sequential.driven_pose import DrivenPose
 from sequential.manifold import SE3
-from sequential.models import Position, StereoPixels
+from sequential.models import RandomWalk
 from sequential.timeline import Problem
 
 __all__ = ["SpatialGraph"]
@@ -38,10 +38,11 @@ class SpatialGraph(NativeGraph):
         super().__init__(problem)
         self.landmarks: list[Array] = []
         self.makers = []
+        self.sizes = []
         for sensor in problem.model.sensors.values():
-            self.makers.append(sensor_factor(sensor, len(self.landmarks)))
-            if isinstance(sensor, StereoPixels):
-                self.landmarks += list(np.asarray(sensor.landmarks))
+            self.makers.append(pose_factor(sensor, Body(first=len(self.landmarks))))
+            self.landmarks += seen_landmarks(sensor)
+            self.sizes.append(sensor.manifold.size)
         self.delta, self.noise = composed(problem)
 
     def keys(self, k: int) -> list[int]:
@@ -74,12 +75,12 @@ class SpatialGraph(NativeGraph):
         return [factor], flat_pose(pose3(x).compose(delta))
 
     def reading_factors(self, k: int) -> list[Any]:
-        """Stereo and position factors."""
-        plan = self.problem.schedule
-        return [
-            self.makers[plan.sensor[r]](k, plan.z[r, :3], int(plan.context[r, 0]))
-            for r in range(plan.reading_ptr[k], plan.reading_ptr[k + 1])
-        ]
+        """Factors of whatever `pose_factor` knows."""
+        plan, made = self.problem.schedule, []
+        for r in range(plan.reading_ptr[k], plan.reading_ptr[k + 1]):
+            sensor, which = plan.sensor[r], int(plan.context[r, 0])
+            made.append(self.makers[sensor](k, plan.z[r, : self.sizes[sensor]], which))
+        return made
 
     def read(self, source: Any, k: int) -> Array:
         """State (7,) from `Values` or an incremental engine."""
@@ -106,29 +107,10 @@ def composed(problem: Problem) -> tuple[Array, Array]:
     return arrived, noise
 
 
-def sensor_factor(sensor: Any, first: int) -> Callable[[int, Array, int], Any] | None:
-    """Maker of the native factor of a sensor whose landmarks begin at L(first), or None."""
-    if sensor.gate is not None:
+@native_process.register(DrivenPose)
+@native_process.register(RandomWalk)
+def _(process: DrivenPose | RandomWalk, problem: Problem) -> NativeGraph | None:
+    if type(process) not in {DrivenPose, RandomWalk} or not isinstance(problem.model.manifold, SE3):
         return None
-    model = noise_model(sensor.noise_cov, sensor.loss)
-    if isinstance(sensor, StereoPixels) and sensor.shared_row:
-        fx, fy, cx, cy = map(float, sensor.intrinsics)
-        mount = pose3(np.asarray(sensor.body_T_camera))
-        camera = gtsam.Cal3_S2Stereo(fx, fy, 0.0, cx, cy, sensor.baseline)
-        return lambda k, z, i: gtsam.GenericStereoFactor3D(
-            gtsam.StereoPoint2(*z), model, X(k), L(first + i), camera, mount
-        )
-    if isinstance(sensor, Position) and sensor.axes == 3:
-        arm = np.zeros(3)
-        arm[: len(sensor.lever_arm)] = sensor.lever_arm
-        if arm.any():
-            return lambda k, z, i: gtsam.GPSFactorArm(X(k), z, arm, model)  # noqa: ARG005
-        return lambda k, z, i: gtsam.GPSFactor(X(k), z, model)  # noqa: ARG005
-    return None
-
-
-@native_process.register
-def _(process: DrivenPose, problem: Problem) -> NativeGraph | None:
-    fits = type(process) is DrivenPose and isinstance(problem.model.manifold, SE3)
-    native = fits and all(sensor_factor(s, 0) is not None for s in problem.model.sensors.values())
-    return SpatialGraph(problem) if native else None
+    native = SpatialGraph(problem)
+    return native if all(native.makers) else None
