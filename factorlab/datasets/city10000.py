@@ -55,7 +55,7 @@ def load_city10000(data: Path | None) -> SlamDataset:
             "The file carries no weights; σ of 0.02 m, 0.02 m and 0.01 rad are those of its simulation.",
         ),
         default_estimators=("batch", "batch_robust"),
-        graph_options={"initial": "lago", "covariance": False},
+        graph_options={"initial": "lago"},
     )
 
 
