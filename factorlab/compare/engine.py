@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.compare.accuracy import errors_of
 from factorlab.compare.axes import axis_errors
+from factorlab.compare.bought import Bought, Told, bought
 from factorlab.compare.estimators import EVERY_NAME, KINDS, require_names
 from factorlab.compare.fitting import fit
 from factorlab.compare.honesty import nis_of, normalised_error_of
+from factorlab.compare.lag_sweep import Lag, lag_sweep
+from factorlab.compare.pair import filter_of, smoother_of
+from factorlab.compare.resources import resources
 from factorlab.compare.table import Comparison, Row, Tuned
 from factorlab.compare.timing import solve
-from factorlab.compare.verdict import findings_of
+from factorlab.compare.verdict import Finding, findings_of
 from factorlab.datasets import Dataset
 from sequential.errors import FactorlabError
 from sequential.history import Run
 from sequential.model import StateSpace
+from sequential.smoothers import FixedLagSmoother
 from sequential.timeline import Problem, prepare
 
 __all__ = ["Progress", "compare"]
@@ -39,6 +44,7 @@ def compare(
     max_gap: float | None = None,
     progress: Progress = silent,
     fitted: tuple[Tuned, StateSpace] | None = None,
+    lags: Sequence[float] | None = None,
 ) -> Comparison:
     """Run estimators side by side on one recording.
 
@@ -50,6 +56,7 @@ def compare(
     max_gap : longest pause of the input stream that is bridged, s
     progress : called with what is being done, how much is done, and out of how much
     fitted : noise that was fitted already, in place of `tune`
+    lags : windows, in seconds, of a fixed-lag smoother; by default those that the dataset recommends
 
     Raises
     ------
@@ -58,7 +65,8 @@ def compare(
     """
     names = require_names(tuple(estimators) if estimators else _recommended(dataset))
     tune = tune or fitted is not None
-    step = _Steps(progress, len(names) * (2 if tune else 1) + tune + 1)
+    lags = tuple(dataset.lags if lags is None else lags)
+    step = _Steps(progress, len(names) * (2 if tune else 1) + tune + 1 + bool(lags))
     untuned: tuple[Row, ...] = ()
     tuned, model = None, dataset.model
     if tune:
@@ -69,7 +77,44 @@ def compare(
     rows = _rows(names, dataset, problem, seed, step, ", tuned" if tune else "")
     step("diagnosis")
     findings = findings_of(problem, rows)
-    return Comparison(dataset, model, rows, findings, _readings(dataset), seed, untuned, tuned)
+    swept: tuple[Lag, ...] = ()
+    if lags:
+        step("lags")
+        swept = _swept(dataset, problem, lags)
+    gain = _gain(rows, findings)
+    return Comparison(dataset, model, rows, findings, _readings(dataset), seed, untuned, tuned, swept, gain)
+
+
+def _swept(dataset: Dataset, problem: Problem, lags: Sequence[float]) -> tuple[Lag, ...]:
+    """Windows of several lengths, settled by the chain solver, which takes every model."""
+    return lag_sweep(
+        lambda lag: FixedLagSmoother(lag).solve_both(problem),
+        lambda run: errors_of(dataset, problem.model, run),
+        lags,
+        _readings(dataset),
+        lambda run: axis_errors(dataset, run),
+    )
+
+
+def _gain(rows: tuple[Row, ...], findings: tuple[Finding, ...]) -> Bought | None:
+    """The first filter beside the smoother that stands for all; None where one of them is missing."""
+    before, after = filter_of(rows), smoother_of(rows)
+    return None if before is None or after is None else bought(_told(before), _told(after), findings)
+
+
+def _told(row: Row) -> Told:
+    honest, nis = row.normalised_error, row.nis
+    assert row.resources is not None  # noqa: S101 - solved rows have them
+    return Told(
+        row.name,
+        row.title,
+        row.rmse,
+        None if honest is None else honest.mean / honest.expected,
+        None if nis is None or nis.kind != "filter" else nis.mean / nis.expected,
+        row.us_per_measurement,
+        row.resources.latency_s,
+        row.resources.memory_kb,
+    )
 
 
 def _recommended(dataset: Dataset) -> tuple[str, ...]:
@@ -142,4 +187,5 @@ def _row(name: str, dataset: Dataset, problem: Problem, seed: int, run: Run, sec
         run.report.message,
         run,
         axis_errors(dataset, run),
+        resources(name, run),
     )

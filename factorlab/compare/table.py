@@ -10,8 +10,11 @@ from typing import Any, Protocol
 
 from factorlab.compare.accuracy import Errors
 from factorlab.compare.axes import AxisErrors
+from factorlab.compare.bought import Bought
 from factorlab.compare.estimators import KINDS
 from factorlab.compare.honesty import Nis, NormalisedError
+from factorlab.compare.lag_sweep import Lag
+from factorlab.compare.resources import Resources
 from factorlab.compare.verdict import Finding
 from factorlab.datasets import Dataset
 from factorlab.versions import versions
@@ -38,6 +41,7 @@ class Row:
     message: str = ""
     run: Run | None = field(default=None, repr=False)
     axes: AxisErrors | None = field(default=None, repr=False)
+    resources: Resources | None = None
 
     @property
     def title(self) -> str:
@@ -70,6 +74,7 @@ class Row:
             "axes": None if self.axes is None else self.axes.to_json(),
             "seconds": self.seconds,
             "us_per_measurement": self.us_per_measurement,
+            "resources": None if self.resources is None else self.resources.to_json(),
             "iterations": self.iterations,
             "converged": self.converged,
             "message": self.message,
@@ -100,7 +105,7 @@ class Comparison:
     """Many estimators, one log, one table.
 
     `rows` hold the tuned result where `tuned` is given, and `untuned` the result with the noise as shipped.
-    `findings` are the verdict on `rows`.
+    `findings` are the verdict on `rows`, `lags` windows of several lengths between filter and batch.
     """
 
     dataset: Dataset
@@ -111,6 +116,8 @@ class Comparison:
     seed: int
     untuned: tuple[Row, ...] = ()
     tuned: Tuned | None = None
+    lags: tuple[Lag, ...] = ()
+    bought: Bought | None = None
 
     @property
     def name(self) -> str:
@@ -132,6 +139,9 @@ class Comparison:
         if self.tuned is not None:
             plain["untuned"] = {row.name: row.to_json() for row in self.untuned}
             plain["tuning"] = self.tuned.to_json()
+        if self.lags:
+            plain["lag_sweep"] = [lag.to_json() for lag in self.lags]
+        plain["bought"] = None if self.bought is None else self.bought.to_json()
         plain["findings"] = [finding.to_json() for finding in self.findings]
         return plain | {"notes": list(self.dataset.notes), "readings": self.readings, "seed": self.seed}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import degrees, floor, isfinite, log10
+from math import floor, isfinite, log10
 from textwrap import wrap
 
 from factorlab.compare.estimators import KINDS
@@ -14,7 +14,6 @@ __all__ = ["band", "cells", "figure", "headings", "headline", "terminal", "tunin
 
 NOTHING = "–"
 WIDTH = 110
-AXES = ("x", "y", "z")
 PAGE_ONLY = {7, 8, 11}  # columns that a terminal has no room for: band and median of the NIS, iterations
 
 
@@ -140,46 +139,10 @@ def terminal(comparison: Comparison) -> Iterable[str]:
         yield from _table(comparison, comparison.rows, "")
     if any(row.nis is not None and row.nis.kind != "filter" for row in comparison.rows):
         yield "° leave-one-out: each reading predicted from all the others, before and after"
-    yield from axis_lines(comparison.rows)
+    from factorlab.compare.smoothing_text import smoothing_lines
+
+    yield from smoothing_lines(comparison)
     yield from (f"- {note}" for note in comparison.dataset.notes)
-
-
-def axis_table(rows: tuple[Row, ...]) -> list[tuple[str, ...]]:
-    """Share of errors within ±3σ and RMSE of each axis, headings first; empty without a truth of the turn."""
-    told = [row for row in rows if row.axes is not None]
-    if not told or all(len(row.axes.names) <= len(AXES) for row in told if row.axes is not None):
-        return []
-    first = told[0].axes
-    assert first is not None  # noqa: S101 - looked above
-    lines = [("inside ±3σ (99.7 % exp.), RMSE", *first.names)]
-    for row in told:
-        if row.axes is None:
-            continue
-        scaled = zip(row.axes.inside(), row.axes.rmse(), row.axes.units, strict=True)
-        lines.append(
-            (row.title, *(f"{100 * share:.1f} %  {_small(rmse, unit)}" for share, rmse, unit in scaled))
-        )
-    return lines
-
-
-def _small(rmse: float, unit: str) -> str:
-    """`21.3 mm`, `0.84°`, or metres where they are many."""
-    if unit == "rad":
-        return f"{figure(degrees(rmse))}°"
-    return f"{figure(1e3 * rmse)} mm" if rmse < 1.0 else f"{figure(rmse)} m"
-
-
-def axis_lines(rows: tuple[Row, ...]) -> Iterable[str]:
-    """`axis_table` for a terminal."""
-    table = axis_table(rows)
-    if not table:
-        return
-    wide = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for line in table:
-        yield "  ".join(
-            c.ljust(w) if k == 0 else c.rjust(w) for k, (c, w) in enumerate(zip(line, wide, strict=True))
-        )
-    yield ""
 
 
 def verdict_lines(findings: tuple[Finding, ...]) -> Iterable[str]:

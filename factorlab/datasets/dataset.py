@@ -112,6 +112,7 @@ class Dataset:
     knobs : the noise that `tune` may change; `build` makes a model from their values by name
     notes : one sentence each about what a reader of a result should know
     default_estimators : names for a comparison that names none
+    lags : windows, in seconds, of a fixed-lag smoother for a comparison that names none
     """
 
     name: str
@@ -125,6 +126,7 @@ class Dataset:
     build: Callable[[Mapping[str, float]], StateSpace]
     notes: tuple[str, ...] = ()
     default_estimators: tuple[str, ...] = ("ekf", "ekf_rts", "ieks", "batch")
+    lags: tuple[float, ...] = ()
 
     def positions(self, run: Run) -> Array:
         """(N, axes) positions of the vehicle in the world frame, m."""

@@ -77,6 +77,7 @@ def load_kitti(use_every: int, data: Path | None) -> Dataset:
             "held-out fixes carry the receiver's own noise (σ about 0.26 m as declared)",
         ),
         default_estimators=ESTIMATORS,
+        lags=(0.0, 1.0, 5.0, 20.0),
     )
 
 

@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 FILE = Path("robot") / "barfoot" / "dataset3.mat"
 PRIOR_SIGMAS = (0.02, 0.02, 0.02, 0.01, 0.01, 0.01)  # rad, m: the start is the recorded truth's
 ESTIMATORS = ("ekf", "iekf", "ukf", "ekf_rts", "ieks", "fixed_lag", "batch")
+LAGS = (0.0, 0.2, 1.0, 5.0)  # s
 
 
 class StarryNight(NamedTuple):
@@ -93,6 +94,7 @@ def load_starry_night(data: Path | None) -> Dataset:
             "noise as the file states it, white and independent from point to point",
         ),
         default_estimators=ESTIMATORS,
+        lags=LAGS,
     )
 
 

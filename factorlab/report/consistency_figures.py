@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from factorlab.compare import Comparison, Row
-from factorlab.report.pair import filter_of, smoother_of
+from factorlab.compare.pair import filter_of, smoother_of
 from factorlab.report.style import blank, legend_below, line_of, log_axis, thin, widths
 from sequential.errors import ShapeError
 from sequential.evaluate import whiteness

@@ -1,4 +1,4 @@
-"""Accuracy against time."""
+"""Accuracy against time: of estimators, and of windows of several lengths."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from factorlab.compare import Comparison, Row
+from factorlab.compare.pair import filter_of, smoother_of
+from factorlab.compare.smoothing_text import unit_of
+from factorlab.report.lag_figure import lag_figure
 from factorlab.report.style import LINES, blank, legend_below, log_axis
 
-__all__ = ["cost"]
+__all__ = ["cost", "lag_sweep"]
 
 
 def cost(comparison: Comparison) -> Figure | None:
@@ -50,4 +53,24 @@ def _mark(axes: Axes, row: Row, *, hollow: bool) -> None:
         markersize=9,
         markerfacecolor="none" if hollow else look["color"],
         label=None if hollow else row.title,
+    )
+
+
+def lag_sweep(comparison: Comparison) -> Figure | None:
+    """The lags of a comparison, beside its filter and its smoother."""
+    rows = [row for row in (filter_of(comparison.rows), smoother_of(comparison.rows)) if row is not None]
+    honest = [
+        (
+            row.title,
+            None
+            if row.normalised_error is None
+            else row.normalised_error.mean / row.normalised_error.expected,
+        )
+        for row in rows
+    ]
+    return lag_figure(
+        comparison.lags,
+        rmse=[(row.title, row.rmse) for row in rows],
+        honesty=honest,
+        unit=unit_of(comparison),
     )

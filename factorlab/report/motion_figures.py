@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from factorlab.compare import Comparison, Row
 from factorlab.compare.accuracy import has_position, scored_sensor
+from factorlab.compare.pair import filter_of, smoother_of
 from factorlab.compare.text import figure
-from factorlab.report.pair import filter_of, smoother_of
 from factorlab.report.style import blank, broken, legend_below, line_of, log_axis, thin, title_of, widths
 from sequential.log import seconds
 from sequential.models import Position
@@ -133,8 +133,8 @@ def envelopes(comparison: Comparison) -> Figure | None:
     """Error of each axis within ±3σ, a filter beside a smoother."""
     chosen = [filter_of(comparison.rows), smoother_of(comparison.rows)]
     rows = [row for row in chosen if row is not None and row.errors is not None]
-    if not rows:
-        return None
+    if not rows or (rows[0].axes is not None and len(rows[0].axes.names) > comparison.dataset.axes):
+        return None  # `axis_envelopes` shows these axes and the rotation's
     count = min(3, rows[0].errors.error.shape[1])  # type: ignore[union-attr]
     drawing, axes = blank(1.9 * count + 0.6, count, len(rows), sharex=True)
     for column, row in enumerate(rows):

@@ -10,9 +10,12 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from factorlab.compare import Comparison
+from factorlab.compare.bought import sentences
+from factorlab.compare.smoothing_text import axis_table, lag_table, unit_of
 from factorlab.compare.text import band, cells, figure, headings, headline, tuning_lines
+from factorlab.report.axis_figures import axis_envelopes
 from factorlab.report.consistency_figures import autocorrelations, innovations_over_time, quantiles
-from factorlab.report.cost_figure import cost
+from factorlab.report.cost_figure import cost, lag_sweep
 from factorlab.report.motion_figures import envelopes, errors_over_time, sigmas, trajectory
 from factorlab.report.style import inline_svg
 from factorlab.report.template import fill
@@ -48,6 +51,19 @@ PLOTS = (
         "Error and stated ±3σ",
         "A consistent estimate leaves the shaded band three times in a thousand.",
         envelopes,
+    ),
+    Plot(
+        "axes",
+        "Each axis and its ±3σ",
+        "A consistent estimate is inside in 99.7 %; places along the world's axes, turns about the body's.",
+        axis_envelopes,
+    ),
+    Plot(
+        "lags",
+        "What waiting is worth",
+        "A window's newest estimate waits for nothing; what leaves it is as late as the window is long, and "
+        "has seen what came since.",
+        lag_sweep,
     ),
     Plot(
         "nis",
@@ -109,6 +125,10 @@ def _run(comparison: Comparison, index: int) -> dict[str, Any]:
         "headline": headline(comparison),
         "tables": tables,
         "tuning": tuning_lines(comparison.tuned) if comparison.tuned else (),
+        "axis_table": axis_table(comparison),
+        "lag_table": lag_table(comparison),
+        "bought": () if comparison.bought is None else sentences(comparison.bought, unit_of(comparison)),
+        "why": () if comparison.bought is None else comparison.bought.why,
         "leave_one_out": any(row.nis and row.nis.kind != "filter" for row in comparison.rows),
         "plots": [made for plot in PLOTS if (made := _plot(plot, comparison, index))],
     }

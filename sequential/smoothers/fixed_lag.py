@@ -1,4 +1,9 @@
-"""An online smoother: the last few seconds of the chain are solved anew at every node."""
+"""An online smoother: the last few seconds of the chain are solved anew at every node.
+
+Each node is estimated twice: when it is the newest, from what came before, and when it leaves the window,
+`lag` seconds late, from what came since as well.  At lag zero both are the (iterated) filter's estimate; as
+the lag grows the late one becomes the batch's.
+"""
 
 from __future__ import annotations
 
@@ -24,41 +29,75 @@ Array = NDArray[np.float64]
 class FixedLagSmoother:
     """Gauss-Newton on a window of the chain; what leaves the window lives on as the window's prior.
 
-    Takes any model, and gives the online estimate: what is known at each node when its readings arrive.
-    With a lag longer than the log it is the batch, solved again at every node.
+    Takes any model, and gives the online estimate: what is known at each node when its readings arrive, or
+    with `delayed` what is known when it leaves the window.  With a lag longer than the log it is the batch,
+    solved again at every node.
 
     Parameters
     ----------
     lag : length of the window, s; infinity keeps everything, at a cost that grows with the square of the log
     max_iterations, tolerance : of Gauss-Newton in each window; the tolerance is in standard deviations
+    delayed : estimate each node as it leaves the window, not as it enters
     """
 
     lag: float = 5.5
     max_iterations: int = 10
     tolerance: float = 1e-3
+    delayed: bool = False
     name = "fixed_lag"
 
     def solve(self, problem: Problem) -> Run:
-        """Online estimate at each node."""
+        """Online or delayed estimate at each node."""
+        return self.solve_both(problem)[self.delayed]
+
+    def solve_both(self, problem: Problem) -> tuple[Run, Run]:
+        """Online and delayed estimate of one pass; `details` say how large a window got, and how slow."""
         began = time.perf_counter()
         window = _Window(problem)
         nodes, model = len(problem.t), problem.model
-        mean = np.empty((nodes, model.manifold.size))
-        cov = np.empty((nodes, model.manifold.dim, model.manifold.dim))
+        d = model.manifold.dim
+        newest, late = (_Estimates(nodes, model.manifold.size, d) for _ in range(2))
         oldest = np.searchsorted(problem.t, problem.t - self._lag_ns(problem))
+        slowest, widest, left = 0.0, 1, 0
         for k in range(nodes):
+            entered = time.perf_counter()
             window.grow(k, int(oldest[k]))
             window.settle(self.max_iterations, self.tolerance)
-            mean[k], cov[k] = window.states[k], window.chain.cov[-1]
-        require_finite(problem, mean)
+            slowest, widest = max(slowest, time.perf_counter() - entered), max(widest, k + 1 - window.first)
+            newest.take(window, k, k + 1)
+            leaving = nodes if k + 1 == nodes else min(int(oldest[k + 1]), k + 1)
+            late.take(window, left, leaving)
+            left = max(left, leaving)
+        require_finite(problem, newest.mean)
         seconds = time.perf_counter() - began
-        report = Report(self.name, iterations=window.solves, seconds=seconds, message=window.whole.message())
-        innovations = predicted_innovations(problem, mean, cov)
-        return Run(problem.t, mean, cov, model.manifold, innovations, float("nan"), report)
+        details = {"widest_window": float(widest), "slowest_update_s": slowest}
+        report = Report(
+            self.name,
+            iterations=window.solves,
+            seconds=seconds,
+            message=window.whole.message(),
+            details=details,
+        )
+        told = (problem.t, newest.mean, newest.cov, model.manifold)
+        online = Run(*told, predicted_innovations(problem, newest.mean, newest.cov), float("nan"), report)
+        return online, Run(problem.t, late.mean, late.cov, model.manifold, {}, float("nan"), report)
 
     def _lag_ns(self, problem: Problem) -> int:
         whole = int(problem.t[-1] - problem.t[0]) + 1
         return whole if self.lag * 1e9 >= whole else round(self.lag * 1e9)
+
+
+class _Estimates:
+    """Means and covariances of all nodes, filled from windows."""
+
+    def __init__(self, nodes: int, n: int, d: int) -> None:
+        self.mean, self.cov = np.empty((nodes, n)), np.empty((nodes, d, d))
+
+    def take(self, window: _Window, first: int, last: int) -> None:
+        """What a window says of nodes first..last-1."""
+        if last > first:
+            self.mean[first:last] = window.states[first:last]
+            self.cov[first:last] = window.chain.cov[first - window.first : last - window.first]
 
 
 class _Window:

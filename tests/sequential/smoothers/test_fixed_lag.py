@@ -42,6 +42,50 @@ def test_any_lag_is_the_filter_on_a_linear_model(world, lag, rng):
         assert not first.all()
 
 
+@pytest.mark.parametrize("world", LINEAR, ids=lambda w: w.name)
+def test_what_leaves_an_endless_window_is_the_batch(world, rng):
+    problem = world.problem(rng)
+    late = sq.FixedLagSmoother(lag=float("inf"), delayed=True).solve(problem)
+    batch = sq.RauchTungStriebel(sq.KalmanFilter(), leave_one_out=False).solve(problem)
+    np.testing.assert_allclose(late.mean, batch.mean, atol=1e-8 * np.abs(batch.mean).max())
+    np.testing.assert_allclose(late.cov, batch.cov, atol=1e-8 * np.abs(batch.cov).max())
+
+
+@pytest.mark.parametrize("world", LINEAR, ids=lambda w: w.name)
+def test_what_leaves_a_window_is_the_smoother_of_so_much_more_log(world, rng):
+    """Node by node: the estimate that leaves is that of all readings until the moment it left."""
+    problem, lag = world.problem(rng), 1.0
+    online, late = sq.FixedLagSmoother(lag).solve_both(problem)
+    filtered = sq.KalmanFilter().solve(problem)
+    np.testing.assert_allclose(online.mean, filtered.mean, atol=1e-9 * np.abs(filtered.mean).max())
+    for node in (0, len(problem.t) // 3, len(problem.t) // 2):
+        until = problem.t[np.flatnonzero(problem.t - problem.t[node] <= lag * 1e9)[-1]]
+        known = problem.only(problem.reading_t <= until)
+        smoothed = sq.RauchTungStriebel(sq.KalmanFilter(), leave_one_out=False).solve(known)
+        assert distance(late, smoothed, node) < 1e-6
+        np.testing.assert_allclose(late.cov[node], smoothed.cov[node], atol=1e-8 * smoothed.cov[node].max())
+
+
+@pytest.mark.parametrize("world", EVERY_WORLD, ids=lambda w: w.name)
+def test_without_lag_both_estimates_are_one(world, rng):
+    online, late = sq.FixedLagSmoother(lag=0.0).solve_both(world.problem(rng))
+    np.testing.assert_array_equal(online.mean, late.mean)
+    np.testing.assert_array_equal(online.cov, late.cov)
+    assert late.report.details["widest_window"] <= 2
+    assert late.report.details["slowest_update_s"] > 0
+
+
+def test_five_seconds_later_a_real_drive_is_known_four_times_better():
+    (kitti,) = load("kitti")
+    assert kitti.held_out is not None
+    problem = sq.prepare(kitti.model, kitti.log, at=kitti.held_out.t)
+    rmse = []
+    for run in sq.FixedLagSmoother(lag=5.0).solve_both(problem):
+        error = kitti.positions(run)[run.index(kitti.held_out.t)] - kitti.held_out.values
+        rmse.append(np.sqrt((error**2).sum(axis=1).mean()))
+    assert rmse == pytest.approx([3.85, 0.854], abs=0.03)
+
+
 def test_a_real_drive_with_five_seconds_of_lag():
     (kitti,) = load("kitti")
     assert kitti.held_out is not None

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from factorlab.compare import KINDS, Row
+from typing import TYPE_CHECKING
+
+from factorlab.compare.estimators import KINDS
+
+if TYPE_CHECKING:
+    from factorlab.compare.table import Row
 
 __all__ = ["filter_of", "smoother_of"]
 
