@@ -23,6 +23,7 @@ from factorlab.datasets.rail import load_rail
 from factorlab.datasets.slam import SlamDataset
 from factorlab.datasets.starry_night import load_starry_night
 from factorlab.datasets.victoria_park import load_victoria_park
+from factorlab.datasets.starry_night_slam import load_starry_night_slam
 from sequential.errors import DataError
 
 __all__ = ["NAMES", "SLAM_NAMES", "Dataset", "SlamDataset", "Truth", "load", "load_slam"]
@@ -45,6 +46,7 @@ _SLAM_LOADERS: dict[str, Callable[[Path | None, int | None], list[SlamDataset]]]
     "city10000": lambda data, _robot: [load_city10000(data)],
     "victoria_park": lambda data, _robot: load_victoria_park(data),
     "planar_monocular": lambda data, _robot: load_planar_monocular(data),
+    "starry_night": lambda data, _robot: [load_starry_night_slam(data)],
 }
 SLAM_NAMES = tuple(_SLAM_LOADERS)
 

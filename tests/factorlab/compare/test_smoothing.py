@@ -62,10 +62,9 @@ def test_axes_on_the_plane_have_a_heading(walker):
     t = walker.truth.t
     state = np.column_stack([walker.truth.position, np.linspace(-4.0, 4.0, len(t))])
     flat = dataclasses.replace(walker, truth=Truth(t, state[:, :2], state[:, 2]))
-    run = sq.Run(
-        t, sq.SE2().normalize(state + np.array([0.0, 0.0, 0.1])), np.tile(np.eye(3), (len(t), 1, 1)), sq.SE2(), {}, 0.0,
-        sq.Report("made up"),
-    )  # fmt: skip
+    turned = sq.SE2().normalize(state + np.array([0.0, 0.0, 0.1]))
+    cov = np.tile(np.eye(3), (len(t), 1, 1))
+    run = sq.Run(t, turned, cov, sq.SE2(), {}, float("nan"), sq.Report("made up"))
     told = axis_errors(flat, run)
     assert told.names == ("x", "y", "heading")
     np.testing.assert_allclose(told.error[:, 2], 0.1, atol=1e-9)
