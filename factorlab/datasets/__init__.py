@@ -22,8 +22,8 @@ from factorlab.datasets.pose_graphs import load_intel, load_mit, load_sphere2500
 from factorlab.datasets.rail import load_rail
 from factorlab.datasets.slam import SlamDataset
 from factorlab.datasets.starry_night import load_starry_night
-from factorlab.datasets.victoria_park import load_victoria_park
 from factorlab.datasets.starry_night_slam import load_starry_night_slam
+from factorlab.datasets.victoria_park import load_victoria_park
 from sequential.errors import DataError
 
 __all__ = ["NAMES", "SLAM_NAMES", "Dataset", "SlamDataset", "Truth", "load", "load_slam"]
