@@ -41,7 +41,9 @@ def calibration_json(run: CamImuRun) -> str:
     """Our own format: the camera and every number with its covariance."""
     from vision3d.camera_files.own_json import camera_record
 
-    whole = {"format": FORMAT, "version": 1, "camera": camera_record(run.job.camera)} | cam_imu_numbers(run)
+    kalibr = {"T_cam_imu": matrix_of(run.found.camera_T_imu).tolist(), "timeshift_cam_imu": run.time_offset_s}
+    whole = {"format": FORMAT, "version": 1, "camera": camera_record(run.job.camera), **kalibr}
+    whole |= cam_imu_numbers(run)
     return json.dumps(whole, indent=1, ensure_ascii=False) + "\n"
 
 

@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.cam_imu.checked import Checked, checked
+from factorlab.cam_imu.files import Mounting
 from factorlab.cam_imu.numbering import numbered_alike
 from factorlab.camera.job import silent, timed
 from sequential.errors import DataError
 from sequential.noise import ImuNoise
 from sequential.sensors.recording import ImuRecording
 from vision3d.inertial import CamImuCalibration, CamImuSettings, Corners, Imu, calibrate_cam_imu
+from vision3d.inertial.checks import SEARCH_S, require_overlap
 
 if TYPE_CHECKING:
     from factorlab.cam_imu.demo import Truth
@@ -44,6 +46,7 @@ class CamImuJob:
     camera_name : where the camera comes from
     most_hz : frames a second that are looked at
     noise_name : the file that the IMU's noise comes from
+    compare, compare_name : another calibration of the same rig, and where it comes from
     checks : also calibrate each half alone, and measure the board
     """
 
@@ -53,6 +56,8 @@ class CamImuJob:
     camera_name: str = ""
     most_hz: float = 20.0
     noise_name: str = ""
+    compare: Mounting | None = None
+    compare_name: str = ""
     checks: bool = True
 
 
@@ -129,6 +134,11 @@ def calibrate_recording(
             f"the camera is of images of {told}, and these are {given}; calibrate it at their size"
         )
     common = frames.absolute if clocks == "auto" else clocks == "same"
+    if common and (span := frames.span_ns) is not None:  # before the board is looked for
+        reach = job.settings.search_s or SEARCH_S
+        ends = (1e-9 * (t - int(recording.t[0])) for t in (*span, int(recording.t[-1])))
+        begin, end, last = ends
+        require_overlap((begin, end), (0.0, last), (-reach, reach))
     return calibrate_images(
         frames.each(job.most_hz), recording, job, common_clock=common, stamps_from=frames.told,
         total=frames.source.count or 0, say=say, progress=progress,

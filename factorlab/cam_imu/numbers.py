@@ -13,7 +13,7 @@ from vision3d.inertial.excitation import excitation_of
 if TYPE_CHECKING:
     from factorlab.cam_imu.job import CamImuRun
 
-__all__ = ["cam_imu_numbers", "matrix_of", "truth_errors"]
+__all__ = ["cam_imu_numbers", "difference_from", "matrix_of", "truth_errors"]
 
 
 def matrix_of(pose: Any) -> Any:
@@ -93,6 +93,8 @@ def cam_imu_numbers(run: CamImuRun) -> dict[str, Any]:
             "board_scale": run.checked.board_scale,
             "board_scale_std": run.checked.board_scale_std,
         }
+    if run.job.compare is not None:
+        numbers["difference"] = {"from": run.job.compare_name, "step": difference_from(run).tolist()}
     if run.truth is not None:
         numbers["truth"] = truth_errors(run)
     return numbers
@@ -107,6 +109,14 @@ def _used_names(run: CamImuRun) -> list[str]:
     """Names of the frames that the estimation holds: those within the IMU's recording."""
     held = np.isin(run.times, run.found.problem.corners.t)
     return [name for name, one in zip(run.names, held, strict=True) if one]
+
+
+def difference_from(run: CamImuRun) -> Any:
+    """(7,) the other calibration's, less ours: rotation, translation (our right chart), offset."""
+    other = run.job.compare
+    assert other is not None  # noqa: S101 - the caller has looked
+    pose = SE3().local(run.found.camera_T_imu, other.camera_T_imu)
+    return np.append(pose, other.time_offset_s - run.time_offset_s)
 
 
 def truth_errors(run: CamImuRun) -> dict[str, float]:

@@ -43,6 +43,15 @@ class StampedFrames:
     told: str
     absolute: bool
 
+    @property
+    def span_ns(self) -> tuple[int, int] | None:
+        """First and last stamp, the latter by the nominal rate where it is not known; None for no length."""
+        if self.stamps is not None:
+            return int(self.stamps[0]), int(self.stamps[-1])
+        if self.source.count is None:
+            return None
+        return self.begin_ns, self.begin_ns + round(1e9 * self.source.count / self.source.fps)
+
     def each(self, most_hz: float | None = None) -> Iterator[tuple[str, int, Image]]:
         """Names, stamps (ns) and grey images, at most so many a second."""
         least_ns = 0 if most_hz is None else round(0.98e9 / most_hz)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from factorlab.cam_imu.numbers import truth_errors
+from factorlab.cam_imu.numbers import difference_from, truth_errors
 from factorlab.camera.verdicts import judged
 from factorlab.report.document import Status, Verdict
 from vision3d.inertial.excitation import excitation_of, missing_motion
@@ -43,6 +43,7 @@ def cam_imu_verdicts(run: CamImuRun) -> tuple[Verdict, ...]:
         *_board(run),
         _biases(run),
         _solved(run),
+        *_other(run),
         *_truth(run),
     )
 
@@ -163,13 +164,15 @@ def _halves(run: CamImuRun) -> list[Verdict]:
         return [Verdict("halves agree", None, None, "WARN", meaning, "record half a minute or more")]
     d = run.checked.halves
     status = judged(sigmas, GOOD_SIGMAS, FAIR_SIGMAS)
-    meaning = (
-        f"each half of the recording alone: {np.degrees(np.linalg.norm(d[:3])):.3f}°, "
-        f"{1e3 * np.linalg.norm(d[3:6]):.2f} mm and {1e3 * abs(d[6]):.3f} ms apart; the largest of the seven "
-        "differences in σ"
-    )
+    meaning = f"each half of the recording alone: {apart_in_words(d)} apart; the largest of the seven in σ"
     action = "" if status == "PASS" else "is the rig rigid, the focus fixed, and do both clocks run evenly?"
     return [Verdict("halves agree", sigmas, None, status, meaning, action, "σ")]
+
+
+def apart_in_words(difference: Any) -> str:
+    """Rotation, translation and offset of a difference (7,)."""
+    turn, shift = np.degrees(np.linalg.norm(difference[:3])), 1e3 * np.linalg.norm(difference[3:6])
+    return f"{turn:.3f}°, {shift:.2f} mm and {1e3 * abs(difference[6]):.3f} ms"
 
 
 def _board(run: CamImuRun) -> list[Verdict]:
@@ -208,6 +211,24 @@ def _solved(run: CamImuRun) -> Verdict:
     status: Status = "PASS" if adjusted.settled else "FAIL"
     action = "" if adjusted.settled else "the minimum was not reached; set --knots, or record again"
     return Verdict("least squares settled", None, None, status, meaning, action)
+
+
+def _other(run: CamImuRun) -> list[Verdict]:
+    """How far the calibration to compare with is."""
+    if run.job.compare is None:
+        return []
+    difference = difference_from(run)
+    cov = run.found.cov[:7, :7] + (0.0 if run.job.compare.cov is None else run.job.compare.cov)
+    sigmas = float(np.max(np.abs(difference) / np.sqrt(np.diagonal(cov))))
+    small = (
+        np.degrees(np.linalg.norm(difference[:3])) <= GOOD_ROTATION
+        and 1e3 * np.linalg.norm(difference[3:6]) <= GOOD_TRANSLATION
+        and 1e3 * abs(difference[6]) <= GOOD_OFFSET
+    )
+    status: Status = "PASS" if small or sigmas < GOOD_SIGMAS else "WARN"
+    meaning = f"{apart_in_words(difference)} apart; the largest of the seven differences in σ"
+    action = "" if status == "PASS" else "was the rig taken apart since, or the camera set otherwise?"
+    return [Verdict(f"difference from {run.job.compare_name}", sigmas, None, status, meaning, action, "σ")]
 
 
 def _truth(run: CamImuRun) -> list[Verdict]:

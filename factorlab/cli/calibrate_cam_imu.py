@@ -55,6 +55,8 @@ OPTIONS: tuple[Callable[[Command], Command], ...] = (
                  show_default=True, metavar="HZ", help="Frames a second that are looked at."),
     click.option("--knots", "knots_per_s", type=click.FloatRange(1, 400), metavar="N",
                  help="Knots of the trajectory a second.  [default: as many as the readings ask for]"),
+    click.option("--compare", type=click.Path(path_type=Path), metavar="FILE",
+                 help="Another calibration of the rig: camchain-imucam.yaml, or an earlier report's folder."),
     click.option("--checks/--no-checks", default=True, show_default=True,
                  help="Calibrate each half alone too, and measure the board by the IMU."),
     click.option("--demo", is_flag=True, help="A rendered recording whose truth is known."),
@@ -166,6 +168,7 @@ def _settings(options: dict[str, Any]) -> Any:
 
 def _job(options: dict[str, Any]) -> CamImuJob:
     from factorlab.cam_imu import CamImuJob
+    from factorlab.cam_imu.files import read_mounting
     from factorlab.cli.board_options import board_of
     from vision3d.camera_files import read_camera
 
@@ -177,5 +180,7 @@ def _job(options: dict[str, Any]) -> CamImuJob:
         camera_name=options["camera_file"].name,
         most_hz=options["most_hz"],
         noise_name="" if noise is None else noise.name,
+        compare=None if options["compare"] is None else read_mounting(options["compare"]),
+        compare_name="" if options["compare"] is None else options["compare"].name,
         checks=options["checks"],
     )

@@ -130,8 +130,15 @@ def biases(run: CamImuRun) -> Figure:
     figure, axes = blank(4.6, 2, 3, sharex=True)
     rig = None if run.truth is None else run.truth.rig
     for row, values, std, gain, label, truth in (
-        (0, state.gyro_bias, stds[0], float(np.degrees(1.0)), "gyro, °/s", rig and rig.gyro_bias),
-        (1, state.accel_bias, stds[1], 1.0, "accelerometer, m/s²", rig and rig.accel_bias),
+        (
+            0,
+            state.gyro_bias,
+            stds[0],
+            float(np.degrees(1.0)),
+            "gyro, °/s",
+            None if rig is None else rig.gyro_bias,
+        ),
+        (1, state.accel_bias, stds[1], 1.0, "accelerometer, m/s²", None if rig is None else rig.accel_bias),
     ):
         for k, (name, colour) in enumerate(AXES):
             ax = axes[row, k]

@@ -112,14 +112,21 @@ def align(turns: Turns, imu_t: Array, gyro: Array, search: tuple[float, float]) 
     camera, own, dt = turns.vectors[inside], integrated[inside], turns.seconds[inside]
     R, bias, residual = _wahba(camera, own, dt)
     mirrored = _wahba(camera, own, dt, handed=-1.0)[2]
-    speeds = np.linalg.norm(camera, axis=1), np.linalg.norm(own - bias * dt[:, None], axis=1)
-    gain = float(
-        np.median(speeds[1][speeds[0] > np.median(speeds[0])] / speeds[0][speeds[0] > np.median(speeds[0])])
-    )
+    gain = _gain(camera, own, dt)
     return Aligned(
         offset, R, bias, float(correlations[best]), rival, gain, mirrored < 0.5 * residual,
         offsets, correlations, residual,
     )  # fmt: skip
+
+
+def _gain(camera: Array, own: Array, dt: Array) -> float:
+    """How many times faster the gyro turns than the camera: by deviations from the median, free of bias."""
+    sizes = [
+        np.linalg.norm(one / dt[:, None] - np.median(one / dt[:, None], axis=0), axis=1)
+        for one in (own, camera)
+    ]
+    busy = sizes[1] >= np.median(sizes[1])
+    return float(np.median(sizes[0][busy]) / max(float(np.median(sizes[1][busy])), 1e-12))
 
 
 def _integrated(turns: Turns, imu_t: Array, total: Array, offset: float) -> tuple[Array, NDArray[np.bool_]]:

@@ -9,14 +9,14 @@ from sequential.errors import DataError
 from vision3d.inertial.alignment import Aligned
 from vision3d.inertial.problem import Corners, Imu
 
-__all__ = ["check_alignment", "check_readings", "search_range"]
+__all__ = ["SEARCH_S", "check_alignment", "check_readings", "require_overlap", "search_range"]
 
 Array = NDArray[np.float64]
 FEWEST_FRAMES = 20
 SHORTEST_S = 3.0
 SEARCH_S = 1.0
 DEGREES = float(np.degrees(1.0))
-NEARLY = 1.35  # of a ratio
+NEARLY, WRONG = 1.35, 1.5  # of a ratio
 LEAST_CORRELATION = 0.5
 GRAVITIES = (0.7, 1.4)  # of what an accelerometer reads at the median, over gravity
 
@@ -74,20 +74,35 @@ def search_range(
         if search_s is not None:
             middle = imu.t[0] - corners.t[0]
             low, high = max(low, middle - search_s), min(high, middle + search_s)
-    common = min(corners.t[-1] + high, imu.t[-1]) - max(corners.t[0] + low, imu.t[0])
-    if common < SHORTEST_S:
-        apart = imu.t[0] - corners.t[0]
-        raise DataError(
-            f"camera and IMU do not overlap in time: the frames span {_span(corners.t)}, the IMU "
-            f"{_span(imu.t)} by the same count, and offsets of the clocks of up to "
-            f"{max(abs(low), abs(high)):g} s are tried; if their clocks differ by more (their beginnings are "
-            f"{apart:.3f} s apart), say --clocks apart"
-        )
+    require_overlap((corners.t[0], corners.t[-1]), (imu.t[0], imu.t[-1]), (low, high))
     return low, high
 
 
-def _span(t: Array) -> str:
-    return f"{t[0]:.2f} to {t[-1]:.2f} s"
+def require_overlap(
+    frames: tuple[float, float], imu: tuple[float, float], offsets: tuple[float, float]
+) -> None:
+    """Raise unless the frames and the IMU overlap at some of the offsets; begins and ends in s.
+
+    Raises
+    ------
+    DataError
+        with both spans.
+    """
+    low, high = offsets
+    common = min(frames[1] + high, imu[1]) - max(frames[0] + low, imu[0])
+    # a recording that is itself too short is another fault
+    if common >= min(SHORTEST_S, 0.5 * (frames[1] - frames[0]), 0.5 * (imu[1] - imu[0])):
+        return
+    raise DataError(
+        f"camera and IMU do not overlap in time: the frames span {_span(frames)}, the IMU {_span(imu)}, and "
+        f"offsets of the clocks of up to {max(abs(low), abs(high)):g} s are tried; if their clocks have "
+        f"nothing to do with each other (their beginnings are {imu[0] - frames[0]:.3f} s apart), say "
+        "--clocks apart"
+    )
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.2f} to {ends[1]:.2f} s"
 
 
 def check_alignment(aligned: Aligned, imu: Imu, corners: Corners) -> None:
@@ -98,6 +113,12 @@ def check_alignment(aligned: Aligned, imu: Imu, corners: Corners) -> None:
     ):
         if factor / NEARLY < aligned.gain < factor * NEARLY:
             raise DataError(f"the gyro turns {aligned.gain:.3g} times as fast as the camera: {words}")
+    if aligned.correlation >= LEAST_CORRELATION and not 1.0 / WRONG < aligned.gain < WRONG:
+        raise DataError(
+            f"the gyro turns {aligned.gain:.3g} times as fast as the camera; give its unit with --units "
+            "gyro=…, calibrate its gain (factorlab calibrate gyro), and see that the camera's calibration is "
+            "that of these pictures"
+        )
     if aligned.mirrored:
         raise DataError(
             "the gyro turns as the camera's mirror image does: one axis has the wrong sign, or two are "

@@ -29,8 +29,9 @@ __all__ = ["FramePoses", "pose_frames", "start_state", "stretches"]
 Array = NDArray[np.float64]
 SHORTEST_S = 1.0  # of a stretch
 LONGEST_BLIND_S = 0.7  # without a frame: an IMU alone is not carried farther
-GAP = 4.5  # intervals of the IMU that make a gap
+GAP, GAP_S = 4.5, 0.06  # intervals of the IMU that make a gap, and seconds
 EDGE_S = 0.02
+LEAST_SIGMA_PX = 0.2  # of a corner, for the first poses
 AROUND_S = 0.05  # of IMU before the first and after the last frame
 
 
@@ -50,8 +51,9 @@ def pose_frames(camera: Camera, corners: Corners) -> tuple[FramePoses, NDArray[n
     starts = np.searchsorted(corners.frame, np.arange(len(corners.t) + 1))
     for k in range(len(corners.t)):
         rows = slice(starts[k], starts[k + 1])
+        own = corners.points[rows], corners.pixels[rows], np.maximum(corners.sigma_px[rows], LEAST_SIGMA_PX)
         try:
-            one = estimate_pose(camera, corners.points[rows], corners.pixels[rows], corners.sigma_px[rows])
+            one = estimate_pose(camera, *own, robust=True)
         except FactorlabError:
             continue
         good[k] = True
@@ -69,7 +71,7 @@ def stretches(frames_t: Array, imu_t: Array) -> list[tuple[float, float]]:
         where there is none.
     """
     usual = float(np.median(np.diff(imu_t)))
-    breaks = np.flatnonzero(np.diff(imu_t) > GAP * usual)
+    breaks = np.flatnonzero(np.diff(imu_t) > max(GAP * usual, GAP_S))
     begins = np.concatenate([[imu_t[0]], imu_t[breaks + 1]])
     ends = np.concatenate([imu_t[breaks], [imu_t[-1]]])
     found = []

@@ -131,7 +131,8 @@ class State:
         columns = constants.matrix_columns
         accel[constants.accel_entries] += own[columns[0]]
         gyro[constants.gyro_entries] += own[columns[1]]
-        grown = np.exp(own[constants.scale_column]) if constants.board_scale else 1.0
+        # linear, as positions are: board and path grow together without a residual
+        grown = 1.0 + own[constants.scale_column] if constants.board_scale else 1.0
         return replace(
             self,
             rotations=SO3().retract(self.rotations, controls[:, :3]),
