@@ -15,10 +15,12 @@ from sequential.slam.models import (
     LandmarkRange,
     LandmarkRangeBearing,
     MarkerCorners,
+    MountedRangeBearing,
     OfSensor,
     PlanarProjection,
     Prior,
     Projection,
+    ScaledOdometry,
     StereoProjection,
 )
 from vision3d.camera import Camera
@@ -49,6 +51,15 @@ class Member:
 def anywhere(*manifolds, scale=2.0):
     """States of manifolds, rotations up to any angle."""
     return lambda rng, count: tuple(m.random(rng, scale, (count,)) for m in manifolds)
+
+
+def with_scale(*manifolds, scale=0.7):
+    """States of manifolds, the last of them a scale of some per cent."""
+
+    def draw(rng, count):
+        return (*anywhere(*manifolds[:-1], scale=scale)(rng, count), manifolds[-1].random(rng, 0.1, (count,)))
+
+    return draw
 
 
 def in_view(rng, count, mount=None, depth=(2.0, 6.0)):
@@ -95,6 +106,13 @@ FACTORS = [
         for m in (SE2(), SE3(), SO2(), SO3(), Vector(2), Vector(5))
     ),
     Member("range and bearing", LandmarkRangeBearing(), anywhere(SE2(), Vector(2)), (1,)),
+    Member(
+        "range and bearing, mounted",
+        MountedRangeBearing(),
+        with_scale(SE2(), Vector(2), Vector(4)),
+        (1,),
+    ),
+    Member("odometry with scales", ScaledOdometry(), with_scale(SE2(), SE2(), Vector(2), scale=0.3), (0, 1)),
     Member("range in the plane", LandmarkRange(), anywhere(SE2(), Vector(2))),
     Member("range in space", LandmarkRange(SE3()), anywhere(SE3(), Vector(3))),
     Member("bearing", LandmarkBearing(), anywhere(SE2(), Vector(2))),

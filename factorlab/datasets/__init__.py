@@ -16,6 +16,7 @@ from factorlab.datasets.city10000 import load_city10000
 from factorlab.datasets.dataset import Dataset, Truth
 from factorlab.datasets.kitti import load_kitti
 from factorlab.datasets.mrclam import load_mrclam
+from factorlab.datasets.mrclam_slam import load_mrclam_slam
 from factorlab.datasets.planar_monocular import load_planar_monocular
 from factorlab.datasets.plaza import load_plaza
 from factorlab.datasets.pose_graphs import load_intel, load_mit, load_sphere2500, load_w10000
@@ -39,6 +40,7 @@ _LOADERS: dict[str, Callable[[int, Path | None, int | None], list[Dataset]]] = {
 NAMES = tuple(_LOADERS)
 
 _SLAM_LOADERS: dict[str, Callable[[Path | None, int | None], list[SlamDataset]]] = {
+    "mrclam": load_mrclam_slam,
     "intel": lambda data, _robot: [load_intel(data)],
     "mit": lambda data, _robot: [load_mit(data)],
     "sphere2500": lambda data, _robot: load_sphere2500(data),

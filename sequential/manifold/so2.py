@@ -14,6 +14,8 @@ __all__ = ["SO2", "wrap_angle"]
 
 def wrap_angle(angle: Array) -> Array:
     """Wrap angles (...), rad, into ]-pi, pi]; angles already inside are returned to the last bit."""
+    if np.all(np.abs(angle) < np.pi):
+        return np.array(angle)
     wrapped = angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
     # Next to the cut the division may round to a whole turn, which leaves the result an ulp outside.
     wrapped = np.where(np.abs(wrapped) >= np.pi, np.pi, wrapped)

@@ -7,7 +7,9 @@ the Lie group textbooks (where each divides by a power of the angle) need no spe
 
 from __future__ import annotations
 
+from functools import cache
 from math import factorial
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,8 @@ __all__ = ["SERIES_BELOW", "SERIES_TERMS", "half_cotangent", "inverse_coefficien
 
 SERIES_BELOW = 1.0
 """Squared angle (rad²) under which the Taylor series is summed; the closed forms cancel digits there."""
+
+FEW = 8  # so many angles are summed as plain numbers, which saves the start of twenty array operations
 
 SERIES_TERMS = 10
 """Terms kept: the first one left out is below 1 / 20! = 4e-19 for squared angles under `SERIES_BELOW`."""
@@ -38,6 +42,8 @@ def stumpff(order: int, squared: Array) -> Array:
         c_k, shape (...), with a relative error below 1e-13 for k <= 5.
     """
     small = squared < SERIES_BELOW
+    if np.all(small):
+        return _series(order, squared)
     series = _series(order, np.where(small, squared, 0.0))
     closed = _closed(order, np.where(small, SERIES_BELOW, squared))
     return np.where(small, series, closed)
@@ -58,10 +64,25 @@ def inverse_coefficient(squared: Array) -> Array:
 
 def _series(order: int, squared: Array) -> Array:
     """Sum the Taylor series by Horner's rule."""
-    total = np.zeros_like(squared)
-    for term in reversed(range(SERIES_TERMS)):
-        total = 1.0 / factorial(order + 2 * term) - squared * total
+    coefficients = _coefficients(order)
+    if np.size(squared) <= FEW:
+        own = [_horner(coefficients, x) for x in np.ravel(squared).tolist()]
+        return np.reshape(own, np.shape(squared))
+    return np.asarray(_horner(coefficients, squared))
+
+
+def _horner(coefficients: tuple[float, ...], squared: Any) -> Any:
+    """The sum for a number or for an array, the same to the last bit."""
+    total = coefficients[0]
+    for coefficient in coefficients[1:]:
+        total = coefficient - squared * total
     return total
+
+
+@cache
+def _coefficients(order: int) -> tuple[float, ...]:
+    """Of the series, highest power first."""
+    return tuple(1.0 / factorial(order + 2 * term) for term in reversed(range(SERIES_TERMS)))
 
 
 def _closed(order: int, squared: Array) -> Array:

@@ -75,7 +75,8 @@ class Association:
         bound, JCBB)
     gate : χ² quantile within which a reading may be of a landmark
     new : χ² quantile beyond which of *every* landmark a reading begins a new one; what lies between the two
-        is rejected, for it is too far to be sure of and too near to be another
+        is rejected, for it is too far to be sure of and too near to be another.  A landmark that another
+        reading of the step is of does not count: two readings of one step are of two landmarks
     """
 
     method: str = "joint"
@@ -97,10 +98,14 @@ class Association:
             return np.full(count, NEW)
         squared = candidates.squared()
         inside = squared <= chi2_quantile(self.gate, m)
-        chosen = np.where((squared > chi2_quantile(self.new, m)).all(axis=1), NEW, REJECTED)
         pairs = _nearest(squared, inside)
         if self.method == "joint" and len(pairs) > 1:
             pairs = _joint(candidates, squared, inside, self.gate)
+        # two readings of one step are of two landmarks, so that one which is taken explains no other
+        taken = {landmark for _, landmark in pairs}
+        free = [landmark for landmark in range(landmarks) if landmark not in taken]
+        beyond = squared[:, free] > chi2_quantile(self.new, m)
+        chosen = np.where(beyond.all(axis=1), NEW, REJECTED)
         for n, landmark in pairs:
             chosen[n] = landmark
         return chosen.astype(np.int64)

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from sequential.errors import ModelError
 from sequential.slam.association import Association
 from sequential.slam.ekf_run import FilterRun
-from sequential.slam.estimate import SlamRun
+from sequential.slam.estimate import SlamRun, Values
 from sequential.slam.joint_belief import JointBelief
 from sequential.slam.problem import SlamProblem
 
-__all__ = ["LINEARISATIONS", "EkfSlam"]
+__all__ = ["LINEARISATIONS", "EkfSlam", "filtered_start"]
 
 LINEARISATIONS = ("standard", "first_estimates", "invariant")
 
@@ -81,3 +81,8 @@ class EkfSlam:
             if self.watch is not None:
                 self.watch(step, run.belief)
         return run.result(self.name, began)
+
+
+def filtered_start(problem: SlamProblem) -> Values:
+    """Values for a graph to begin from: an invariant filter's, which errs less far than dead reckoning."""
+    return EkfSlam("invariant").solve(problem).values

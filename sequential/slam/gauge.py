@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sequential.errors import ModelError
 from sequential.manifold import SE2, SE3, Manifold, Vector
 from sequential.manifold.quaternion import rotation_matrix
-from sequential.slam.joint_belief import Variable
+from sequential.manifold.so3 import skew
 from sequential.slam.problem import Factors, SlamProblem
 
 __all__ = ["FRAME", "POINT", "VECTOR", "act", "directions", "world_roles"]
@@ -65,27 +65,22 @@ def act(rigid: Manifold, motion: Array, role: str, value: Array) -> Array:
 
 
 def directions(rigid: Manifold, role: str, value: Array, dim: int) -> Array:
-    """(dim, g) how a variable's tangent answers to a small motion of the world, in the tangent of `rigid`."""
+    """(..., dim, g) how tangents answer to a small motion of the world, in the tangent of `rigid`.
+
+    `value` (..., size) are variables of one role, whose manifold has `dim` directions.
+    """
     if role == FRAME:
         return rigid.transport(rigid.identity(), value)[0]
-    moved = np.zeros((dim, rigid.dim))
+    moved = np.zeros((*value.shape[:-1], dim, rigid.dim))
     if role not in (POINT, VECTOR):
         return moved
     if isinstance(rigid, SE2):
-        moved[:, 2] = -value[1], value[0]
-        moved[:, :2] = np.eye(2) if role == POINT else 0.0
+        moved[..., 0, 2], moved[..., 1, 2] = -value[..., 1], value[..., 0]
+        moved[..., :2] = np.eye(2) if role == POINT else 0.0
         return moved
-    x, y, z = value
-    moved[:, :3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    moved[:, 3:] = np.eye(3) if role == POINT else 0.0
+    moved[..., :3] = -skew(value)
+    moved[..., 3:] = np.eye(3) if role == POINT else 0.0
     return moved
-
-
-def directions_of(
-    rigid: Manifold, roles: Mapping[str, str], kinds: Mapping[str, Manifold], value: Mapping[Variable, Array]
-) -> dict[Variable, Array]:
-    """`directions` of every variable."""
-    return {v: directions(rigid, roles[v[0]], x, kinds[v[0]].dim) for v, x in value.items()}
 
 
 def rigid_of(problem: SlamProblem, roles: Mapping[str, str]) -> tuple[str, Manifold]:

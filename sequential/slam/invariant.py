@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sequential.manifold import SE2
-from sequential.slam.gauge import FRAME, POINT, VECTOR, act, directions, rigid_of, world_roles
+from sequential.slam.gauge import FRAME, POINT, VECTOR, directions, rigid_of, world_roles
 from sequential.slam.joint_belief import JointBelief
+from sequential.slam.models.displacement import into_world
 from sequential.slam.problem import SlamProblem
 
 __all__ = ["Frame"]
@@ -27,32 +28,40 @@ class Frame:
     def __init__(self, problem: SlamProblem) -> None:
         self.roles = world_roles(problem)
         self.kind, self.rigid = rigid_of(problem, self.roles)
-        self.rotation = slice(2, 3) if isinstance(self.rigid, SE2) else slice(0, 3)
+        turning = slice(2, 3) if isinstance(self.rigid, SE2) else slice(0, 3)
+        self.rotation = np.arange(self.rigid.dim)[turning]
+        self.shift = np.setdiff1d(np.arange(self.rigid.dim), self.rotation)
 
     def move(self, belief: JointBelief, step: Array, newest: int) -> None:
         """Apply a correction (used,), given in the charts, and carry the covariance along."""
-        pose = self.kind, newest
-        rigid, origin = self.rigid, self.rigid.identity()
+        pose, rigid = (self.kind, newest), self.rigid
         # Ad(x): a step of the body seen from the world
         to_world = np.linalg.inv(directions(rigid, FRAME, belief.value[pose], rigid.dim))[self.rotation]
-        turn = to_world @ step[belief.columns(pose)]
+        at_pose = belief.columns(pose)
+        turn = to_world @ step[at_pose]
         carried = np.eye(belief.used)
-        new = {}
-        for variable, value in belief.value.items():
-            role, at = self.roles[variable[0]], belief.columns(variable)
-            manifold = belief.kinds[variable[0]]
-            if role not in (POINT, VECTOR):
-                new[variable] = manifold.retract(value, step[at])
+        moved = {}
+        for kind, members, at in belief.by_kind():
+            role, manifold = self.roles[kind], belief.kinds[kind]
+            values = np.stack([belief.value[v] for v in members])
+            if role in (POINT, VECTOR):
+                turning = directions(rigid, role, values, manifold.dim)[..., self.rotation]
+                new = self._carry(values, step[at] - turning @ turn, turn)
+                further = directions(rigid, role, new, manifold.dim)[..., self.rotation] - turning
+                carried[at.ravel(), at_pose] = (further @ to_world).reshape(-1, rigid.dim)
+            else:
+                new = manifold.retract(values, step[at])
                 if role == FRAME:
-                    carried[at, at] = rigid.transport(value, new[variable])[0]
-                continue
-            turning = directions(rigid, role, value, manifold.dim)[:, self.rotation]
-            twist = np.zeros(rigid.dim)
-            twist[self.rotation] = turn
-            shift = ~np.isin(np.arange(rigid.dim), np.arange(rigid.dim)[self.rotation])
-            twist[shift] = step[at] - turning @ turn
-            new[variable] = act(rigid, rigid.retract(origin, twist), POINT, value)
-            further = directions(rigid, role, new[variable], manifold.dim)[:, self.rotation] - turning
-            carried[at, belief.columns(pose)] = further @ to_world
-        belief.value.update(new)
+                    carried[at[:, :, None], at[:, None, :]] = rigid.transport(values, new)[0]
+            moved.update(zip(members, new, strict=True))
+        belief.value.update(moved)
         belief.cov[...] = carried @ belief.cov @ carried.T
+
+    def _carry(self, values: Array, shift: Array, turn: Array) -> Array:
+        """Points (N, axes), each moved by the exponential of the common turn and its own shift."""
+        twist = np.empty((len(values), self.rigid.dim))
+        twist[:, self.rotation], twist[:, self.shift] = turn, shift
+        motion = self.rigid.retract(
+            np.broadcast_to(self.rigid.identity(), (len(values), self.rigid.size)), twist
+        )
+        return into_world(self.rigid, motion, values)

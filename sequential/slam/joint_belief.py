@@ -6,7 +6,7 @@ and is given to the next variable of its size, so that poses may come and go whi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,13 +110,20 @@ class JointBelief:
 
     def move(self, step: Array) -> None:
         """Retract every variable by its part of a tangent step (used,)."""
+        for kind, members, at in self.by_kind():
+            moved = self.kinds[kind].retract(np.stack([self.value[v] for v in members]), step[at])
+            self.value.update(zip(members, moved, strict=True))
+
+    def by_kind(self) -> Iterator[tuple[str, list[Variable], Ints]]:
+        """The variables of each kind, and (N, d) the tangent columns of each."""
         for kind, manifold in self.kinds.items():
             members = [v for v in self.value if v[0] == kind]
-            if not members:
-                continue
-            at = np.array([self.block[v] for v in members])[:, None] + np.arange(manifold.dim)
-            moved = manifold.retract(np.stack([self.value[v] for v in members]), step[at])
-            self.value.update(zip(members, moved, strict=True))
+            if members:
+                yield (
+                    kind,
+                    members,
+                    np.array([self.block[v] for v in members])[:, None] + np.arange(manifold.dim),
+                )
 
     def _claim(self, dim: int) -> int:
         """A free block of the tangent."""

@@ -1,5 +1,6 @@
 """Measurements that join variables, each with its Jacobians and, where it determines one, how to place it."""
 
+from sequential.slam.models.calibrated import MountedRangeBearing, ScaledOdometry
 from sequential.slam.models.displacement import Displacement
 from sequential.slam.models.marker import MarkerCorners
 from sequential.slam.models.planar_projection import PlanarProjection
@@ -15,9 +16,11 @@ __all__ = [
     "LandmarkRange",
     "LandmarkRangeBearing",
     "MarkerCorners",
+    "MountedRangeBearing",
     "OfSensor",
     "PlanarProjection",
     "Prior",
     "Projection",
+    "ScaledOdometry",
     "StereoProjection",
 ]

@@ -95,6 +95,16 @@ def test_between_the_gates_nothing_is_begun():
         assert Association().choose(one)[0] == expected
 
 
+def test_two_readings_of_one_step_are_of_two_landmarks():
+    """What is near a landmark that another reading is of, and far from all others, is a new one."""
+    error = np.array([[[0.1, 0.0]], [[2.0, 0.0]]])
+    jacobian = np.tile(np.hstack([-np.eye(2), np.eye(2)]), (2, 1, 1, 1))
+    noise = np.tile(1e-4 * np.eye(2), (2, 1, 1))
+    two = Pairings(error, jacobian, np.tile(np.arange(4), (2, 1, 1)), noise, 0.5 * np.eye(4))
+    for method in ("nearest", "joint"):
+        np.testing.assert_array_equal(Association(method).choose(two), [0, NEW])
+
+
 def test_settings_are_checked():
     with pytest.raises(ModelError, match="quantiles 0 < gate <= new < 1"):
         Association(gate=0.9, new=0.5)
