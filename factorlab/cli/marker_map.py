@@ -51,8 +51,6 @@ def only_with_map(options: dict[str, Any]) -> None:
 
 def run_map(source: str | None, options: dict[str, Any]) -> int:
     """Read, solve, and deliver."""
-    from time import perf_counter
-
     from factorlab.cli.delivery import deliver, require_output
     from factorlab.marker_map.document import map_document
     from factorlab.marker_map.export import map_files
@@ -60,9 +58,7 @@ def run_map(source: str | None, options: dict[str, Any]) -> int:
     _require_sense(source, options)
     out = options["map_out"]
     require_output(out, None, force=options["force"])
-    began = perf_counter()
     job = _demo(options) if options["demo"] else _read(str(source), options)
-    job.__dict__["seconds"] = perf_counter() - began
     return deliver(
         map_document(job, command_line()), as_json=options["as_json"], out=out, force=options["force"],
         check=options["check"], files=map_files(job) if out is not None else None,
@@ -142,7 +138,9 @@ def _offset(text: str | None) -> float | None:
 
 def _read(source: str, options: dict[str, Any]) -> MapJob:
     """Frames and IMU of files."""
-    from factorlab.marker_map.job import MapJob, map_sightings, read_sightings
+    from dataclasses import replace
+
+    from factorlab.marker_map.job import map_job, read_sightings
     from vision3d.camera_files.reading import read_camera
 
     settings = _settings(options)
@@ -151,11 +149,8 @@ def _read(source: str, options: dict[str, Any]) -> MapJob:
     sightings, name, left_out, fault = read_sightings(
         source, camera, settings, timed=imu is not None, say=_say
     )
-    found, vision, clock, offset = map_sightings(sightings, settings, imu, _say)
-    searched = settings.offset_s is not None and math.isnan(settings.offset_s)
-    return MapJob(
-        source, settings, found, len(sightings.t), name, vision, clock, offset, searched, left_out, fault
-    )
+    job = map_job(source, sightings, settings, imu, dictionary=name, say=_say)
+    return replace(job, left_out=left_out, fault=fault)
 
 
 def _imu(options: dict[str, Any]) -> ImuRecording | None:

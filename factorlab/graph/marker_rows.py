@@ -42,6 +42,12 @@ class CornerRows:
         factor = np.linalg.cholesky(sightings.cov)
         return cls(sightings, body_T_camera, np.linalg.inv(factor))
 
+    def only(self, rows: NDArray[np.int64]) -> CornerRows:
+        """Those of some sightings."""
+        kept = np.zeros(len(self.sightings), dtype=np.bool_)
+        kept[rows] = True
+        return CornerRows(self.sightings.keep(kept), self.body_T_camera, self.whitening[rows])
+
     def errors(self, frames: Array, markers: Array) -> Array:
         """(S, 8) whitened; `frames` (S, 7) world_T_body and `markers` (S, 7) world_T_marker of each."""
         pixels = self.sightings.camera.project(self._in_camera(frames, markers)[0])

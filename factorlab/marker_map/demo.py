@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from factorlab.marker_map.extrinsics import Extrinsics
-from factorlab.marker_map.job import MapJob, MapSettings, map_sightings
+from factorlab.marker_map.job import MapJob, MapSettings, map_job
 from factorlab.marker_map.world import NOISE, MarkerWorld
 
 __all__ = ["demo_job"]
@@ -21,5 +21,4 @@ def demo_job(reference: int | None = None, say: Callable[[str], object] = lambda
     world = MarkerWorld.room(rng)
     told = world.record(SECONDS, rng, sigma_px=0.25)
     settings = MapSettings(world.size_m, "4x4_50", reference, Extrinsics(world.body_T_camera), NOISE, 0.0)
-    found, vision, clock, offset = map_sightings(told.sightings, settings, told.imu, say)
-    return MapJob("a simulated room", settings, found, len(told.sightings.t), "4x4_50", vision, clock, offset)
+    return map_job("a simulated room", told.sightings, settings, told.imu, dictionary="4x4_50", say=say)

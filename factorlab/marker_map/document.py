@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from factorlab.marker_map.beside import Beside, beside
 from factorlab.marker_map.export import marker_numbers
 from factorlab.marker_map.job import MapJob
 from factorlab.marker_map.verdicts import map_verdicts, pixel_rms, sentence
@@ -25,6 +26,10 @@ MAP_READ = (
 WAY_READ = "Place and orientation of the {body}, with 3σ as a band (magnified where it would not be seen)."
 SIGMA_READ = (
     "Standard deviations of each frame: how much surer the pose is with the IMU than by its markers alone."
+)
+FILTER_READ = (
+    "Place by the smoother less place by the filter, in the world, with the filter's own 3σ: a filter that "
+    "keeps its word stays inside. Right: how sure each says it is of the place."
 )
 MOTION_READ = "Velocity in the world and the IMU's biases, with 3σ."
 ERRORS_READ = (
@@ -72,6 +77,13 @@ def _sections(job: MapJob) -> list[Section]:
                 caption=SIGMA_READ,
             )
         )
+    if job.filtered is not None and (told := beside(found, job.filtered)) is not None:
+        sections.append(
+            Section(
+                "Filter beside smoother", _filter_words(job, told), _filter_table(job, told),
+                lambda: figures.filter_beside(told), FILTER_READ,
+            )
+        )  # fmt: skip
     sections.append(Section("Reprojection", figure=lambda: figures.reprojection(found), caption=ERRORS_READ))
     return sections
 
@@ -95,6 +107,34 @@ def _marker_table(job: MapJob) -> Table:
         ("share", "%"), "",
     )  # fmt: skip
     return Table(headings, tuple(rows), digits=4)
+
+
+def _filter_words(job: MapJob, told: Beside) -> str:
+    filtered = job.filtered
+    assert filtered is not None  # noqa: S101 - the section is there with one only
+    share = 100.0 * told.covered
+    return (
+        "An error-state EKF whose state grows by every marker it meets, on the same sightings and IMU, told "
+        "relative to the same marker. It knows each pose when its frame arrives, the smoother when the "
+        f"recording ends. It rejected {filtered.rejected} sightings. Of its poses {share:.0f} % lie within "
+        "their own 99.9 % of the smoother's."
+    )
+
+
+def _filter_table(job: MapJob, told: Beside) -> Table:
+    filtered = job.filtered
+    assert filtered is not None  # noqa: S101 - as above
+    rows = []
+    for name, sigma, seconds, frames, late in (
+        ("filter", told.filter_sigma, filtered.seconds, len(filtered.frames), "none"),
+        ("smoother", told.smoother_sigma, job.seconds, len(job.found.frames), "the whole recording"),
+    ):
+        turn, place = np.median(sigma, axis=0)
+        rows.append((name, 1e3 * float(place), float(np.degrees(turn)), 1e3 * seconds / frames, late))
+    headings = (
+        "estimator", ("σ of place", "mm"), ("σ of orientation", "°"), ("time a frame", "ms"), "latency",
+    )  # fmt: skip
+    return Table(headings, tuple(rows))
 
 
 def _bought(job: MapJob) -> str:
@@ -160,11 +200,19 @@ def _imu_numbers(job: MapJob) -> dict[str, Any]:
         "gyro_bias_rad_s": found.biases[-1, 3:].tolist(),
         "gyro_bias_sigma": sigma[-1, 12:15].tolist(),
         "clock": None,
+        "filter": None,
     }
     if clock is not None:
         told["clock"] = {
             "offset_s": float(clock.offset_s), "sigma_s": float(clock.sigma_s),
             "explained": float(clock.explained), "drift_s": [float(v) for v in clock.drift_s],
+        }  # fmt: skip
+    if job.filtered is not None and (both := beside(found, job.filtered)) is not None:
+        told["filter"] = {
+            "covered": both.covered, "apart_m": both.apart_m, "rejected": job.filtered.rejected,
+            "median_sigma_place_m": float(np.median(both.filter_sigma[:, 1])),
+            "median_sigma_place_smoother_m": float(np.median(both.smoother_sigma[:, 1])),
+            "ms_a_frame": 1e3 * job.filtered.seconds / len(job.filtered.frames),
         }  # fmt: skip
     if job.vision is not None:
         told["median_sigma_place_without_m"] = float(np.median(place_sigmas(job.vision)))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +19,13 @@ from vision3d.markers.sightings import MarkerSightings
 
 if TYPE_CHECKING:
     from factorlab.marker_map.extrinsics import Extrinsics
+    from factorlab.marker_map.filter import FilterRun
     from sequential.sensors.recording import ImuRecording
     from vision3d.camera import Camera
     from vision3d.frames import FrameSource
     from vision3d.markers import Marker
 
-__all__ = ["MapJob", "MapSettings", "map_sightings", "read_sightings"]
+__all__ = ["MapJob", "MapSettings", "map_job", "read_sightings"]
 
 Array = NDArray[np.float64]
 STILL_S = 10.0  # photographs are that far apart: nothing ties one pose to the next
@@ -61,6 +63,8 @@ class MapJob:
     Parameters
     ----------
     vision : the map of the camera alone, where there is an IMU
+    filtered : an error-state EKF on the same data and in the map's gauge; None where it could not begin,
+        for the reason in `filter_fault`
     clock : what the turns say about the clocks, on top of the offset used
     searched : whether the offset was found from the turns
     """
@@ -71,13 +75,14 @@ class MapJob:
     frames: int
     dictionary: str | None
     vision: MarkerMap | None = None
+    filtered: FilterRun | None = None
+    filter_fault: str = ""
     clock: ClockOffset | None = None
     offset_s: float = 0.0
     searched: bool = False
     left_out: tuple[str, ...] = ()
     fault: str = ""
     seconds: float = 0.0
-    notes: tuple[str, ...] = field(default=())
 
 
 def read_sightings(
@@ -141,21 +146,26 @@ def _far_apart(frames: FrameSource) -> Iterator[tuple[int, NDArray[np.uint8]]]:
             yield round(frame.index * STILL_S * 1e9) if frame.still else frame.t_ns, frame.image
 
 
-def map_sightings(
+def map_job(
+    source: str,
     sightings: MarkerSightings,
     settings: MapSettings,
     imu: ImuRecording | None = None,
+    *,
+    dictionary: str | None = None,
     say: Callable[[str], object] = lambda _: None,
-) -> tuple[MarkerMap, MarkerMap | None, ClockOffset | None, float]:
-    """The map; with an IMU also that of the camera alone, what the clocks say, and the offset taken.
+) -> MapJob:
+    """The map; with an IMU also that of the camera alone, what the clocks say, and a filter beside it.
 
     Raises
     ------
     DataError
         where camera and IMU have no time in common, or no turn tells the offset that is to be found.
     """
+    began, count = perf_counter(), len(sightings.t)
     if imu is None:
-        return map_markers(sightings, reference=settings.reference), None, None, 0.0
+        found = map_markers(sightings, reference=settings.reference)
+        return MapJob(source, settings, found, count, dictionary, seconds=perf_counter() - began)
     imu.require("accel", "gyro")
     mount = settings.extrinsics
     if mount is None:
@@ -164,18 +174,41 @@ def map_sightings(
         )
     say("the map of the camera alone")
     alone = map_markers(sightings, reference=settings.reference)
-    offset = mount.offset_s if settings.offset_s is None else settings.offset_s
-    if np.isnan(offset):
-        told = clock_offset(alone.t, alone.trajectory, mount.body_T_camera, imu)
-        if told is None:
-            raise DataError(
-                "no offset between the clocks can be found from the turns: the camera hardly turns while it "
-                "sees markers; record some brisk turns, or give --time-offset S"
-            )
-        offset = told.offset_s
+    searched = settings.offset_s is not None and bool(np.isnan(settings.offset_s))
+    offset = _found_offset(alone, mount, imu) if searched else settings.offset_s
+    offset = mount.offset_s if offset is None else offset
     require_overlap(sightings.t + round(offset * 1e9), imu)
     shifted = replace(imu, t=imu.t - round(offset * 1e9))
     clock = clock_offset(alone.t, alone.trajectory, mount.body_T_camera, shifted, reach_s=REACH_S)
     say("the map with the IMU")
     inertial = Inertial(imu, mount.body_T_camera, settings.noise or USUAL, offset)
-    return map_markers(sightings, inertial, reference=settings.reference), alone, clock, offset
+    found = map_markers(sightings, inertial, reference=settings.reference)
+    seconds = perf_counter() - began
+    say("a filter beside it")
+    filtered, fault = _filtered(found)
+    return MapJob(
+        source, settings, found, count, dictionary, alone, filtered, fault, clock, offset, searched,
+        seconds=seconds,
+    )  # fmt: skip
+
+
+def _found_offset(alone: MarkerMap, mount: Extrinsics, imu: ImuRecording) -> float:
+    told = clock_offset(alone.t, alone.trajectory, mount.body_T_camera, imu)
+    if told is None:
+        raise DataError(
+            "no offset between the clocks can be found from the turns: the camera hardly turns while it "
+            "sees markers; record some brisk turns, or give --time-offset S"
+        )
+    return told.offset_s
+
+
+def _filtered(found: MarkerMap) -> tuple[FilterRun | None, str]:
+    """The filter, or why there is none: what is only beside the map does not stop it."""
+    from factorlab.marker_map.filter import filter_markers
+
+    assert found.inertial is not None  # noqa: S101 - asked for with one only
+    row = found.reference
+    try:
+        return filter_markers(found.sightings, found.inertial, row, found.poses[row]), ""
+    except (DataError, np.linalg.LinAlgError) as fault:
+        return None, str(fault)

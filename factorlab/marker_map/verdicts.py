@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from factorlab.marker_map.beside import beside
 from factorlab.marker_map.job import MapJob
 from factorlab.marker_map.mapping import MarkerMap
 from factorlab.report.document import Status, Verdict
@@ -15,6 +16,7 @@ SCALE_WARN, SCALE_FAIL = 4.0, 25.0
 CLOCK_S = 4e-3  # an offset below this moves nothing that a hand-held camera could show
 REJECTED_WARN = 0.05
 EXPLAINED = 0.8
+COVERED = 0.95
 
 
 def map_verdicts(job: MapJob) -> list[Verdict]:
@@ -24,6 +26,7 @@ def map_verdicts(job: MapJob) -> list[Verdict]:
     verdicts += [_fit(found), _rejected(found), _precision(found), *_plane(found), *_decided(found)]
     if found.inertial is not None:
         verdicts += [_gravity(found), *_clocks(job), *_coverage(found), *_biases(found)]
+        verdicts += _filter(job)
     verdicts += [
         Verdict("left out", None, None, "WARN", text, "the rest was read") for text in job.left_out[:5]
     ]
@@ -232,6 +235,23 @@ def _coverage(found: MarkerMap) -> list[Verdict]:
         return []
     text = "of the intervals between frames have no IMU: it paused, began late or ended early"
     return [Verdict("without IMU", 100.0 * apart / (len(found.t) - 1), (0.0, 0.0), "WARN", text, "", "%")]
+
+
+def _filter(job: MapJob) -> list[Verdict]:
+    """Whether an EKF on the same data says honestly how far it may be off."""
+    if job.filtered is None:
+        return [Verdict("filter", None, None, "INFO", f"did not run: {job.filter_fault}")]
+    told = beside(job.found, job.filtered)
+    if told is None:
+        return [Verdict("filter", None, None, "INFO", "has no frame to compare: the recording is too short")]
+    honest = told.covered > COVERED
+    return [
+        Verdict(
+            "filter honest", 100.0 * told.covered, (100.0 * COVERED, 100.0), "PASS" if honest else "INFO",
+            f"of the filter's poses lie within their 99.9 % of the map's, {1e3 * told.apart_m:.1f} mm off",
+            "" if honest else "an EKF-SLAM is surer than it may be: take the map's numbers", "%",
+        )
+    ]  # fmt: skip
 
 
 def _biases(found: MarkerMap) -> list[Verdict]:

@@ -14,9 +14,10 @@ from sequential.manifold import SE3, rotation_matrix
 from vision3d.rigid import compose
 
 if TYPE_CHECKING:
+    from factorlab.marker_map.beside import Beside
     from factorlab.marker_map.mapping import MarkerMap
 
-__all__ = ["camera_covs", "motion", "plan", "reprojection", "sigmas", "way"]
+__all__ = ["camera_covs", "filter_beside", "motion", "plan", "reprojection", "sigmas", "way"]
 
 Array = NDArray[np.float64]
 INK, WAY, BAND = "#222222", "#0072B2", "#D55E00"
@@ -168,6 +169,25 @@ def sigmas(found: MarkerMap, alone: MarkerMap) -> Figure:
             ax.plot(at, rows[:, 0], color=colour, label=label)
             ax.set(xlabel="time, s", ylabel=unit, yscale="log")
     legend_below(figure, axes[0, 0])
+    return figure
+
+
+def filter_beside(told: Beside) -> Figure:
+    """Smoother less filter by axis with the filter's 3σ, and the sigmas of both."""
+    figure, axes = blank(3.0, 1, 4, sharex=True)
+    t = seconds(told.t, int(told.t[0]))
+    for k, name in enumerate("xyz"):
+        at, rows = _gaps(t, 1e3 * np.column_stack([told.place_apart[:, k], 3 * told.place_sigma[:, k]]))
+        axes[0, k].fill_between(at, -rows[:, 1], rows[:, 1], color=BAND, alpha=0.25, linewidth=0)
+        axes[0, k].plot(at, rows[:, 0], color=WAY, linewidth=0.9)
+        axes[0, k].set(ylabel=f"{name}, mm", xlabel="time, s")
+    for sigma, colour, label in (
+        (told.filter_sigma, BAND, "filter"), (told.smoother_sigma, WAY, "smoother"),
+    ):  # fmt: skip
+        at, rows = _gaps(t, 1e3 * sigma[:, 1:])
+        axes[0, 3].plot(at, rows[:, 0], color=colour, label=label)
+    axes[0, 3].set(ylabel="σ of place, mm", xlabel="time, s", ylim=(0, None))
+    legend_below(figure, axes[0, 3])
     return figure
 
 
