@@ -99,9 +99,21 @@ def clock_offset(
     if not np.isfinite(sigma):
         return None
     half = len(turn) // 2
-    parts = [_peak(offset, start[s], end[s], turn[s], at, angle) for s in (slice(0, half), slice(half, None))]
+    parts = [
+        _peak(_nearest(offset, *rows), *rows)
+        for rows in (
+            (start[:half], end[:half], turn[:half], at, angle),
+            (start[half:], end[half:], turn[half:], at, angle),
+        )
+    ]
     drift = (parts[1][0] - parts[0][0], float(np.hypot(parts[0][1], parts[1][1])))
     return ClockOffset(offset, sigma, share, drift)
+
+
+def _nearest(lag: float, start: Array, end: Array, turn: Array, at: Array, angle: Array) -> float:
+    """The best lag within a tenth of a second."""
+    lags = lag + STEP_S * np.arange(-25, 26)
+    return float(lags[np.argmin([_left(one, start, end, turn, at, angle)[0] for one in lags])])
 
 
 def _left(lag: float, start: Array, end: Array, turn: Array, at: Array, angle: Array) -> tuple[float, int]:

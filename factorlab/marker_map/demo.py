@@ -12,11 +12,11 @@ from factorlab.marker_map.world import NOISE, MarkerWorld
 
 __all__ = ["demo_job"]
 
-SEED, SECONDS = 7, 20.0
+SEED, SECONDS = 7, 12.0
 
 
 def demo_job(reference: int | None = None, say: Callable[[str], object] = lambda _: None) -> MapJob:
-    """Twenty seconds in a room with eight markers: a camera at 15 Hz and an IMU at 100 Hz."""
+    """Twelve seconds in a room with eight markers: a camera at 15 Hz and an IMU at 100 Hz."""
     rng = np.random.default_rng(SEED)
     world = MarkerWorld.room(rng)
     told = world.record(SECONDS, rng, sigma_px=0.25)

@@ -195,6 +195,7 @@ def _imu_numbers(job: MapJob) -> dict[str, Any]:
     told: dict[str, Any] = {
         "offset_s": job.offset_s,
         "gravity_m_s2": found.gravity,
+        "size_ratio": None if found.size is None else list(found.size),
         "accel_bias_m_s2": found.biases[-1, :3].tolist(),
         "accel_bias_sigma": sigma[-1, 9:12].tolist(),
         "gyro_bias_rad_s": found.biases[-1, 3:].tolist(),

@@ -102,8 +102,9 @@ def propagated(body: Body, P: Array, segment: Segment, inertial: Inertial) -> tu
         F = np.eye(15)
         F[:3, :3], F[:3, 12:] = turn, -dt * bend
         F[6:9, :3], F[6:9, 9:12] = -dt * R @ skew(force), -dt * R
-        F[3:6, 6:9] = dt * np.eye(3)
-        F[3:6, :3], F[3:6, 9:12] = 0.5 * dt * F[6:9, :3], 0.5 * dt * F[6:9, 9:12]
+        F[6:9, 12:] = -0.5 * dt * F[6:9, :3]  # the force is met half way through the turn
+        F[3:6] = 0.5 * dt * F[6:9]
+        F[3:6, 3:6], F[3:6, 6:9] = np.eye(3), dt * np.eye(3)
         through, Q = F @ through, F @ Q @ F.T
         _add_noise(Q, noise, dt)
         pushed = R @ force + down

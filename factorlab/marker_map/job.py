@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from factorlab.marker_map.clock import ClockOffset, clock_offset, require_overlap
 from factorlab.marker_map.mapping import USUAL, Inertial, MarkerMap, map_markers
-from sequential.errors import DataError
+from sequential.errors import DataError, SolverError
 from sequential.noise import ImuNoise
 from vision3d.markers.sightings import MarkerSightings
 
@@ -29,6 +29,7 @@ __all__ = ["MapJob", "MapSettings", "map_job", "read_sightings"]
 
 Array = NDArray[np.float64]
 STILL_S = 10.0  # photographs are that far apart: nothing ties one pose to the next
+SUSPECT_S, POOR = 4e-3, 0.8
 REACH_S = 0.3  # offsets looked for where the clocks are said to agree
 
 
@@ -182,14 +183,32 @@ def map_job(
     clock = clock_offset(alone.t, alone.trajectory, mount.body_T_camera, shifted, reach_s=REACH_S)
     say("the map with the IMU")
     inertial = Inertial(imu, mount.body_T_camera, settings.noise or USUAL, offset)
-    found = map_markers(sightings, inertial, reference=settings.reference)
+    try:
+        found = map_markers(sightings, inertial, reference=settings.reference)
+    except (DataError, SolverError) as fault:
+        raise type(fault)(f"{fault}{_of_the_clocks(clock, offset)}") from fault
     seconds = perf_counter() - began
     say("a filter beside it")
-    filtered, fault = _filtered(found)
+    filtered, told = _filtered(found)
     return MapJob(
-        source, settings, found, count, dictionary, alone, filtered, fault, clock, offset, searched,
+        source, settings, found, count, dictionary, alone, filtered, told, clock, offset, searched,
         seconds=seconds,
     )  # fmt: skip
+
+
+def _of_the_clocks(clock: ClockOffset | None, offset: float) -> str:
+    """What the turns say, behind a fault that may come from it."""
+    if clock is None:
+        return ""
+    if clock.explained < POOR:
+        share = 100.0 * clock.explained
+        return f"; the gyro explains {share:.0f} % of the camera's turns: suspect the mount or the units"
+    if abs(clock.offset_s) > SUSPECT_S + 3.0 * clock.sigma_s:
+        return (
+            f"; the turns say that the clocks are {1e3 * clock.offset_s:.0f} ms apart: "
+            f"give --time-offset {offset + clock.offset_s:.4f}"
+        )
+    return ""
 
 
 def _found_offset(alone: MarkerMap, mount: Extrinsics, imu: ImuRecording) -> float:

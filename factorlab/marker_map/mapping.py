@@ -76,6 +76,7 @@ class MarkerMap:
     chi2 : (S,) squared norm of the whitened errors of each sighting that was taken, NaN for others
     scale : factor on the variances of corners, 1 where they fit as they claim
     gravity : m/s², length of gravity where it is left free; None without an IMU
+    size : by the IMU, size asked for over size given, and its standard deviation
     decided : frames whose pose only motion could tell from its mirror image
     """
 
@@ -99,6 +100,7 @@ class MarkerMap:
     cost: float
     joint: Array = field(repr=False, default_factory=lambda: np.zeros((0, 0)))
     inertial: Inertial | None = None
+    size: tuple[float, float] | None = None
 
     @property
     def t(self) -> Ints:
@@ -175,7 +177,7 @@ def map_markers(
 
     graph = seen.graph(seen.gated.taken, robust=False)
     solved = graph.solve(MapState(seen.poses[seen.frames], seen.markers[seen.rows]))
-    return finish(seen, solved, graph.covariance(solved.state), None, None)
+    return finish(seen, solved, graph.covariance(solved.state))
 
 
 def _checked(sightings: MarkerSightings, reference: int | None) -> int | None:
@@ -205,7 +207,12 @@ def _turns(sightings: MarkerSightings, inertial: Inertial | None) -> Array | Non
 
 
 def finish(
-    seen: VisionMap, solved: MapSolved, cov: MapCovariance, inertial: Inertial | None, gravity: float | None
+    seen: VisionMap,
+    solved: MapSolved,
+    cov: MapCovariance,
+    inertial: Inertial | None = None,
+    gravity: float | None = None,
+    size: tuple[float, float] | None = None,
 ) -> MarkerMap:
     """Everything under the numbers of the sightings."""
     count, rows = len(seen.sightings.ids), seen.rows
@@ -219,5 +226,5 @@ def finish(
     return MarkerMap(
         seen.sightings, seen.mount, seen.reference, placed, poses, covs, seen.frames, state.frames,
         cov.frames, state.velocities, state.biases, seen.gated, chi2, seen.scale, gravity, seen.decided,
-        seen.iterations, solved.cost, cov.markers, inertial,
+        seen.iterations, solved.cost, cov.markers, inertial, size,
     )  # fmt: skip

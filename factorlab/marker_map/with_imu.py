@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from factorlab.marker_map.gating import gate
 from factorlab.marker_map.inertial_start import InertialStart, carried, deltas, start_inertial, upright
 from factorlab.marker_map.segments import cut_at_frames
+from factorlab.marker_map.size_check import size_by_imu
 from factorlab.marker_map.vision import VisionMap, renumbered
+from sequential.errors import DataError
 from sequential.manifold import SE3, rotate
 from vision3d.rigid import compose
 
@@ -27,6 +29,7 @@ Ints = NDArray[np.int64]
 MANIFOLD = SE3()
 REACH_S = 2.0  # how long an IMU alone may carry a frame to markers that nothing else ties
 ROUNDS = 8
+CONTRADICTS = 0.3  # share of the sightings that the IMU may turn out of the map
 LIKE = 100.0  # squared sigmas within which two sightings of a carried marker agree
 
 
@@ -65,7 +68,8 @@ def with_imu(seen: VisionMap, inertial: Inertial) -> MarkerMap:
             break
         nodes = _bridged(seen, inertial, nodes)
         graph, solved = _solve(seen, inertial, nodes)
-    return finish(seen, solved, graph.covariance(solved.state), inertial, gravity)
+    size = size_by_imu(graph, solved)
+    return finish(seen, solved, graph.covariance(solved.state), inertial, gravity, size)
 
 
 def _levelled(seen: VisionMap, first: InertialStart, inertial: Inertial) -> _Nodes:
@@ -125,7 +129,15 @@ def _solve(seen: VisionMap, inertial: Inertial, nodes: _Nodes) -> tuple[MarkerMa
     taken = kept & seen.gated.sound[sightings.marker]
     graph, solved = _round(seen, inertial, links, nodes.rows, motion, taken, robust=True)
     for _ in range(2):
+        before = int(seen.gated.taken.sum())
         seen.gated = gate(sightings, kept, seen.chi2(), seen.reference, 1.0, seen.gated)
+        if seen.gated.taken.sum() < (1.0 - CONTRADICTS) * before:
+            lost = before - int(seen.gated.taken.sum())
+            raise DataError(
+                f"camera and IMU contradict each other: {lost} of {before} sightings "
+                "fit the map no more once the IMU is added; check the clocks, the mount (T_cam_imu, not its "
+                "inverse), the units and the size of the markers"
+            )
         graph, solved = _round(
             seen, inertial, links, nodes.rows, solved.state, seen.gated.taken, robust=False
         )

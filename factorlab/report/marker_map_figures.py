@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from factorlab.report.style import WIDTH, blank, legend_below
+from factorlab.report.style import WIDTH, blank, legend_below, log_axis
 from sequential.log import seconds
 from sequential.manifold import SE3, rotation_matrix
 from vision3d.rigid import compose
@@ -42,12 +42,14 @@ def plan(found: MarkerMap) -> Figure:
     level = found.inertial is not None
     views = (((0, 1), "from above"), ((0, 2), "from the front")) if level else (
         ((0, 2), "from above"), ((0, 1), "from the front"))  # fmt: skip
+    times = _magnified(found)
+    drawn = "" if times == 1 else f", 3σ drawn {times:g} times"
     for place, ((a, b), title) in enumerate(views, start=1):
         axes = figure.add_subplot(1, 3, place)
-        _squares(axes, found, a, b)
+        _squares(axes, found, a, b, times)
         axes.plot(way[:, a], way[:, b], color=WAY, linewidth=0.9)
         axes.plot(way[0, a], way[0, b], "o", color=WAY, markersize=4)
-        axes.set(xlabel=f"{'xyz'[a]}, m", ylabel=f"{'xyz'[b]}, m", title=title)
+        axes.set(xlabel=f"{'xyz'[a]}, m", ylabel=f"{'xyz'[b]}, m", title=title + drawn)
         axes.set_aspect("equal", adjustable="datalim")
         if not level and b == 1:
             axes.invert_yaxis()  # the reference marker's y points down
@@ -68,7 +70,14 @@ def _everything(found: MarkerMap, way: Array) -> Array:
     return np.vstack([found.corners().reshape(-1, 3), way])
 
 
-def _squares(axes: Any, found: MarkerMap, a: int, b: int) -> None:
+def _magnified(found: MarkerMap) -> float:
+    """By which power of ten ellipses are drawn larger, so that the largest is a third of a marker at most."""
+    sigma = np.sqrt(np.max(np.einsum("kii->ki", found.marker_covs[found.placed][:, 3:, 3:]), initial=0.0))
+    side = float(np.median(found.sightings.size_m))
+    return float(10.0 ** np.clip(np.floor(np.log10(side / max(3.0 * sigma, 1e-9))), 0.0, 3.0))
+
+
+def _squares(axes: Any, found: MarkerMap, a: int, b: int, times: float) -> None:
     """Outlines, numbers, normals and 3σ ellipses in the plane of two axes."""
     rows = np.flatnonzero(found.placed)
     for corners, k in zip(found.corners(), rows, strict=True):
@@ -81,7 +90,13 @@ def _squares(axes: Any, found: MarkerMap, a: int, b: int) -> None:
         circle = np.linspace(0, 2 * np.pi, 40)
         values, vectors = np.linalg.eigh(cov[np.ix_([a, b], [a, b])])
         ring = (vectors * np.sqrt(np.maximum(values, 0.0))) @ np.array([np.cos(circle), np.sin(circle)])
-        axes.fill(centre[a] + 3 * ring[0], centre[b] + 3 * ring[1], color=BAND, alpha=0.35, linewidth=0)
+        axes.fill(
+            centre[a] + 3 * times * ring[0],
+            centre[b] + 3 * times * ring[1],
+            color=BAND,
+            alpha=0.35,
+            linewidth=0,
+        )
         axes.annotate(
             str(found.sightings.ids[k]),
             (centre[a], centre[b]),
@@ -167,7 +182,8 @@ def sigmas(found: MarkerMap, alone: MarkerMap) -> Figure:
         ):
             at, rows = _gaps(t - alone.t[0] * 1e-9, values[:, None])
             ax.plot(at, rows[:, 0], color=colour, label=label)
-            ax.set(xlabel="time, s", ylabel=unit, yscale="log")
+            ax.set(xlabel="time, s", ylabel=unit)
+            log_axis(ax)
     legend_below(figure, axes[0, 0])
     return figure
 
