@@ -34,6 +34,8 @@ Flags = NDArray[np.bool_]
 FIRST = 10  # Gauss-Newton steps with all weights one: a rough answer will do
 STEPS = 2  # Gauss-Newton steps between two looks at the weights
 OUTER = 200
+ROUNDS = 5
+SLACK = 1e-6  # relative: a cost has to fall by more to count
 BELIEVED = 0.5
 GENEROUS = 10.0  # times the fitted variance: a stated one beyond that is no measure of an outlier
 
@@ -115,6 +117,7 @@ class GncSlam:
                 continue  # outliers have spoilt a relaxation, which believes them all
             values, outer = self._graduate(rows, start)
             if self.reconsider and self.loss == "tls":
+                values = self._relaxed_again(problem, rows, values)
                 values = reconsidered(rows, values, SCHEDULES[self.loss])
             tried.append((rows.robust_cost(values, SCHEDULES[self.loss]), values, outer, rows.weights_now()))
         cost, values, outer, weights = min(tried, key=lambda one: one[0])
@@ -179,6 +182,26 @@ class GncSlam:
             mu = schedule.next(mu)
         return values, OUTER
 
+    def _relaxed_again(self, problem: SlamProblem, rows: Weighted, values: Values) -> Values:
+        """Begin once more from a relaxation of what is believed: without outliers it does its best."""
+        schedule = SCHEDULES[self.loss]
+        cost = rows.robust_cost(values, schedule)
+        for _ in range(ROUNDS):
+            weights = rows.weights_now()
+            believed = _trusted(problem, [each < BELIEVED for each in rows.by_group()])
+            starts = _relaxed(believed, dict(values.index))
+            if not starts:
+                return values
+            moved = solve_rows(rows.rows, starts[0], self.max_iterations).values
+            rows.weigh((rows.squared(moved) <= rows.bound).astype(np.float64))
+            moved = solve_rows(rows.rows, moved, self.max_iterations).values
+            reached = rows.robust_cost(moved, schedule)
+            if reached >= cost * (1.0 - SLACK):
+                rows.weigh(weights)
+                return values
+            values, cost = moved, reached
+        return values
+
     def _report(
         self,
         problem: SlamProblem,
@@ -226,7 +249,7 @@ def _relaxed(problem: SlamProblem, index: dict[str, NDArray[np.int64]]) -> list[
         return []
     try:
         return [initial_values(problem, "lago" if isinstance(pose, SE2) else "chordal", index)]
-    except (ModelError, UnderConstrainedError):
+    except (DataError, ModelError, UnderConstrainedError):
         return []
 
 
