@@ -147,14 +147,15 @@ class Feed:
     def _add(self, step: Step, g: int, row: int) -> bool:
         """Add one measurement, with the variable that it begins; False where it has to wait."""
         keys, known = self.keys[g][row], self.known
-        missing = [k for k, key in enumerate(keys) if key not in known]
-        if missing:
+        if not known.issuperset(keys):
+            missing = [k for k, key in enumerate(keys) if key not in known]
             if self.gone and not self.gone.isdisjoint(keys):
                 self.dropped += 1
                 return True
-            for k in [k for k in missing if keys[k] in self.begun]:
-                self._enter(step, keys[k], self.begun[keys[k]])
-                missing.remove(k)
+            if self.begun:
+                for k in [k for k in missing if keys[k] in self.begun]:
+                    self._enter(step, keys[k], self.begun[keys[k]])
+                    missing.remove(k)
             if len(missing) == 1 and self.able(g, missing[0]):
                 placed = self._place(step, g, row, missing[0], keys)
                 if placed is not None:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.native import noise_model
+from factorlab.graph.slam.rows import loss_of
 from factorlab.graph.slam.variables import keys_of
 from sequential.model import Loss
 from sequential.slam import FactorModel, Factors
@@ -59,7 +60,7 @@ def native_factors(group: Factors, loss: Loss | None = None) -> list[Any] | None
     if native is None or group.unknown is not None:
         return None
     columns = [keys_of(slot, np.asarray(group.index)[:, k]) for k, slot in enumerate(group.slots)]
-    noises = noise_models(group, native.order, group.loss or loss)
+    noises = noise_models(group, native.order, loss_of(group, loss))
     return list(map(native.make, *columns, native.readings(np.asarray(group.z)), noises))
 
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from sequential.model import Loss
 from sequential.slam import Factors, SlamProblem, Values
+from sequential.slam.models import Prior
 
-__all__ = ["GroupRows", "Rows", "robust"]
+__all__ = ["GroupRows", "Rows", "loss_of", "robust"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,6 +33,11 @@ def robust(loss: Loss | None, squared: Array) -> tuple[Array, Array]:
     return 0.5 * k * k * np.log1p(squared / (k * k)), k * k / (k * k + squared)
 
 
+def loss_of(group: Factors, otherwise: Loss | None) -> Loss | None:
+    """A group's loss, or the one for groups without; a prior is never doubted by that one."""
+    return group.loss or (None if isinstance(group.model, Prior) else otherwise)
+
+
 class GroupRows:
     """Measurements of one group, whitened.
 
@@ -42,7 +48,7 @@ class GroupRows:
     """
 
     def __init__(self, group: Factors, loss: Loss | None = None) -> None:
-        self.group, self.loss = group, group.loss or loss
+        self.group, self.loss = group, loss_of(group, loss)
         self.z = np.asarray(group.z)
         # upper triangles (m, m), or (N, m, m): GTSAM's square root of the information
         root = np.linalg.cholesky(np.linalg.inv(np.asarray(group.noise_cov)))

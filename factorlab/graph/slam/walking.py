@@ -49,7 +49,9 @@ class Walk:
         believed, began = self.feed.believed, clock()
         for step in self.feed:
             update(step)
-            newest = max(newest, max((key for key in step.new if key >> SHIFT == letter), default=-1))
+            for key in step.new:
+                if key > newest and key >> SHIFT == letter:
+                    newest = key
             if newest >= 0:
                 self.numbers.append(step.number)
                 self.believed.append(believed(newest))

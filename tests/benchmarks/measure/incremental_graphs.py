@@ -28,8 +28,8 @@ BY_HAND = "the same loop written against gtsam by hand"
 
 def figures(*, quick: bool = False) -> dict[str, Figure]:
     """All rows of this part."""
-    poses = 300 if quick else 1200
-    steps = 200 if quick else 1500
+    poses = 300 if quick else 1000
+    steps = 100 if quick else 250
     ours = IncrementalSlam(threshold=THRESHOLD, final=False, covariance=False, online=False)
     cases: dict[str, tuple[SlamProblem, Callable[[SlamProblem], Array]]] = {
         "w10000": (prefix(load_slam("w10000")[0].problem, poses), pose_graph_by_hand),

@@ -113,7 +113,7 @@ def test_a_wrong_name_is_refused():
 
 def test_an_unknown_beginning_is_refused(rng):
     problem, _, _ = loop(rng)
-    with pytest.raises(ModelError, match="initial is one of steps, given, lago"):
+    with pytest.raises(ModelError, match="initial is one of steps, given"):
         BatchSlam(initial="luck").solve(problem)
 
 

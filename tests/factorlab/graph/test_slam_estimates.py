@@ -98,6 +98,18 @@ def test_a_robust_loss_bears_wild_readings(loss, route, rng):
     assert error(loss=loss) < 0.5 * error()
 
 
+@pytest.mark.parametrize("route", ["native", "batched"])
+def test_a_prior_is_never_doubted(route):
+    """Two opinions on one pose: the prior stands where it is, and the other is taken for an outlier."""
+    pose = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
+    factors = (
+        Factors(Prior(SE2()), ("x",), [[0], [1]], pose, 1e-4),
+        Factors(Between(SE2()), ("x", "x"), [[0, 1]], [[1.0, 0.0, 0.0]], 1e-2),
+    )
+    run = BatchSlam(route=route, loss=Loss("huber", 1.0)).solve(SlamProblem({"x": SE2()}, factors))
+    np.testing.assert_allclose(run.values.rows["x"], pose, atol=0.01)
+
+
 @pytest.mark.parametrize("loss", [Loss("huber", 1.345), Loss("cauchy", 1.0)], ids=lambda loss: loss.kind)
 def test_losses_agree_on_both_routes(loss, rng):
     problem = pose_graph(rng, SE2())[0]
