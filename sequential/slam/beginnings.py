@@ -74,6 +74,18 @@ def _able(group: Factors, slot: int) -> bool:
     return False
 
 
+def needs_several(problem: SlamProblem) -> bool:
+    """Whether there is a kind of landmark that no single measurement places."""
+    able, met, placeable = Able(problem), set(), set()
+    for g, group in enumerate(problem.factors):
+        for slot, kind in enumerate(group.slots):
+            if len(group) and kind not in problem.moving:
+                met.add(kind)
+                if group.unknown == slot or able(g, slot):
+                    placeable.add(kind)
+    return bool(met - placeable)
+
+
 def placed(problem: SlamProblem) -> Values:
     """Values of all variables: those of `problem.start`, others by the first measurements that place them.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from sequential.errors import ModelError
 from sequential.slam.association import Association
+from sequential.slam.beginnings import needs_several
 from sequential.slam.ekf_run import FilterRun
 from sequential.slam.estimate import SlamRun, Values
 from sequential.slam.joint_belief import JointBelief
@@ -15,6 +16,7 @@ from sequential.slam.problem import SlamProblem
 
 __all__ = ["LINEARISATIONS", "EkfSlam", "filtered_start"]
 
+WINDOW = 10  # steps that stay where landmarks need several views
 LINEARISATIONS = ("standard", "first_estimates", "invariant")
 
 
@@ -38,7 +40,8 @@ class EkfSlam:
         consistency properties")
     association : for measurements that come without an id
     keep : how many steps before the newest stay in the state, for measurements that join them and for
-        landmarks that need several views; None keeps all
+        landmarks that need several views; None keeps all.  Where no measurement alone places a landmark, as
+        with one camera, 0 means 10
     watch : called after every step with its number and the joint belief, which it must not change
     """
 
@@ -76,7 +79,8 @@ class EkfSlam:
             where nothing says where a pose is.
         """
         began = time.perf_counter()
-        run = FilterRun(problem, self.linearisation, self.association, self.keep)
+        keep = WINDOW if self.keep == 0 and needs_several(problem) else self.keep
+        run = FilterRun(problem, self.linearisation, self.association, keep)
         for step in run.steps():
             if self.watch is not None:
                 self.watch(step, run.belief)

@@ -17,7 +17,7 @@ from sequential.slam.ekf_record import Record
 from sequential.slam.estimate import SlamRun
 from sequential.slam.invariant import Frame
 from sequential.slam.joint_belief import JointBelief, Variable
-from sequential.slam.placing_jointly import place_jointly
+from sequential.slam.placing_jointly import VIEWS, place_by_several, place_jointly
 from sequential.slam.problem import Factors, SlamProblem
 from sequential.slam.robust_weight import weight
 
@@ -40,6 +40,7 @@ class FilterRun:
         self.about = self.belief.first if linearisation == "first_estimates" else self.belief.value
         self.newest = -1
         self.waiting: list[Reading] = []
+        self.again: dict[Variable, int] = {}  # readings that a new attempt to place a variable waits for
         self.fresh = {kind: int(max(problem.indices(kind), default=-1)) + 1 for kind in problem.kinds}
 
     def steps(self) -> Iterator[int]:
@@ -122,7 +123,25 @@ class FilterRun:
                 if place_jointly(self.belief, self.problem, reading, missing[0], self.about, self._move):
                     left.remove(reading)
                     again = True
-        return left
+        return left if moving else self._place_by_several(left)
+
+    def _place_by_several(self, left: list[Reading]) -> list[Reading]:
+        """Add variables that no reading determines alone, where one came now and several do."""
+        together: dict[Variable, list[Reading]] = {}
+        for reading in left:
+            missing = [v for v in reading.variables if v not in self.belief]
+            if len(missing) == 1 and missing[0][1] != UNKNOWN:
+                together.setdefault(missing[0], []).append(reading)
+        used: list[Reading] = []
+        for variable, own in together.items():
+            if len(own) < self.again.get(variable, VIEWS):
+                continue
+            if place_by_several(self.belief, self.problem, own, variable, self.about, self._move):
+                used += own
+            else:
+                self.again[variable] = len(own) + 1 + len(own) // 4
+        gone = set(used)
+        return [reading for reading in left if reading not in gone]
 
     def _require_placed(self, left: Sequence[Reading]) -> None:
         """Every reading's newest pose must be somewhere by now."""
@@ -256,4 +275,5 @@ class FilterRun:
             if any(k in self.problem.moving and i < step - self.keep + 1 for k, i in r.variables)
         ]
         self.record.dropped += len(gone)
-        self.waiting = [r for r in self.waiting if r not in gone]
+        left = set(gone)
+        self.waiting = [r for r in self.waiting if r not in left]
