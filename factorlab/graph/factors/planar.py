@@ -1,4 +1,4 @@
-"""A planar vehicle as BetweenFactorPose2, with ranges, ranges and bearings, and positions."""
+"""A planar vehicle as BetweenFactorPose2, with ranges, bearings, positions and poses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from factorlab.graph.solve import certain_move
 from sequential.compile import compiled
 from sequential.manifold import SE2, Manifold, Product, Vector
 from sequential.model import StateSpace
-from sequential.models import Position, Range, RangeBearing, Unicycle
+from sequential.models import PoseReading, Position, Range, RangeBearing, Unicycle
 from sequential.timeline import Problem
 
 __all__ = ["PlanarGraph"]
@@ -159,9 +159,19 @@ def sensor_factor(sensor: Any) -> Callable[[int, Array, int], Any] | None:
         # GTSAM wants the bearing first.
         model = noise_model(np.asarray(sensor.noise_cov)[::-1, ::-1], sensor.loss)
         return lambda k, z, i: gtsam.BearingRangeFactor2D(X(k), L(i), gtsam.Rot2(z[1]), z[0], model)
-    if isinstance(sensor, Position) and sensor.axes == 2 and not np.any(sensor.lever_arm):
+    return absolute_factor(sensor)
+
+
+def absolute_factor(sensor: Any) -> Callable[[int, Array, int], Any] | None:
+    """Maker of a prior of the pose or of its place; a reading's mount is taken off, and its noise carried."""
+    if isinstance(sensor, Position) and sensor.axes == 2 and not (sensor.arm or np.any(sensor.lever_arm)):
         model = noise_model(sensor.noise_cov, sensor.loss)
         return lambda k, z, i: gtsam.PoseTranslationPrior2D(X(k), gtsam.Pose2(z[0], z[1], 0.0), model)  # noqa: ARG005
+    if isinstance(sensor, PoseReading) and sensor.planar:
+        mount = gtsam.Pose2(*sensor.fixed_mount)  # type: ignore[attr-defined]
+        adjoint, back = mount.AdjointMap(), mount.inverse()
+        model = noise_model(adjoint @ np.asarray(sensor.noise_cov) @ adjoint.T, sensor.loss)
+        return lambda k, z, i: gtsam.PriorFactorPose2(X(k), gtsam.Pose2(*z[:3]).compose(back), model)  # noqa: ARG005
     return None
 
 

@@ -10,6 +10,7 @@ import gtsam
 import numpy as np
 import pytest
 from graph_rows import anywhere, assert_same_system, native_system, our_system
+from graph_worlds import planar
 from sensor_worlds import BODY_T_CAMERA, FIELD, LANDMARKS, MOUNT, TILTED, aided, drifting_camera, imu_inputs
 from worlds import times
 
@@ -213,3 +214,16 @@ def test_a_part_that_neither_walks_nor_is_static_is_not_native(rng):
     cov = np.array(prior.cov)
     cov[15, 3] = cov[3, 15] = 0.1
     assert native_graph(changed(world, prior=sq.Gaussian(prior.mean, cov)).problem(rng)) is None
+
+
+def test_a_localiser_in_the_plane_is_a_prior(rng):
+    """PriorFactorPose2 has the cost of our rows, and the graph's solution is the batched one's."""
+    noise = np.array([[0.04, 0.01, 0.0], [0.01, 0.09, 0.001], [0.0, 0.001, 4e-4]])
+    sensor = sq.PoseReading(noise, body_T_sensor=[0.3, -0.2, 0.5], planar=True)
+    problem = planar(sensor, context=False).problem(rng)
+    chain = ChainGraph(problem)
+    trajectory = anywhere(problem, rng, 0.2)
+    cost = chain.linearise(trajectory)
+    graph, values = build(native_graph(problem), trajectory)
+    assert graph.error(values) == pytest.approx(cost, rel=1e-9)
+    assert_routes_agree(problem, 0.05, 0.02)
