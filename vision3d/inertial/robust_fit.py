@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 FALSE_ALARMS = 0.02
 CAUCHY = 2.385
 WORSE_FRAME = 4.0
-ROUNDS = 6
+ROUNDS, NOISE_ROUNDS = 6, 5
 
 
 def fit(
@@ -30,11 +30,6 @@ def fit(
     """Least squares, robust, the noise found: problem (with weights and noise), solution, bias walk."""
     problem = _first_problem(camera, corners, imu, constants)
     adjusted = adjust(problem, begun, walk)
-    scaled = np.median(np.linalg.norm(adjusted.linear.residuals_px, axis=1) / corners.sigma_px)
-    floor = floor_of(adjusted.linear.residuals_px, corners.sigma_px)
-    if floor > 0.0 and np.isfinite(scaled):
-        corners = replace(corners, sigma_px=np.hypot(corners.sigma_px, floor))
-        problem = replace(problem, corners=corners)
     for round_ in range(ROUNDS):
         problem = _scaled_by_medians(problem, adjusted)
         problem = _weighed(problem, adjusted, trim=round_ >= ROUNDS // 2)
@@ -42,14 +37,23 @@ def fit(
         if round_ == 0 and not _doubtful(problem, adjusted):
             break
     problem = _weighed(problem, adjusted, trim=True)
-    for _ in range(4):
+    problem, adjusted = _with_noise(problem, adjusted, walk)
+    counted = np.where(problem.corner_weight[:, None] > 0.0, adjusted.linear.residuals_px, np.nan)
+    if (floor := floor_of(counted, corners.sigma_px)) > 0.0:
+        wider = replace(corners, sigma_px=np.hypot(corners.sigma_px, floor))
+        problem, adjusted = _with_noise(replace(problem, corners=wider), adjusted, walk)
+    return problem, adjusted, walk
+
+
+def _with_noise(problem: Problem, adjusted: Adjusted, walk: BiasWalk) -> tuple[Problem, Adjusted]:
+    """Least squares and noise in turn, until neither moves."""
+    for _ in range(NOISE_ROUNDS):
         before = problem
         adjusted = adjust(problem, adjusted.state, walk)
         problem = _noise_found(problem, adjusted)
         if np.allclose(_noise(before), _noise(problem), rtol=2e-3):
             break
-    adjusted = adjust(problem, adjusted.state, walk)
-    return problem, adjusted, walk
+    return problem, adjust(problem, adjusted.state, walk)
 
 
 def _noise(problem: Problem) -> Array:

@@ -13,8 +13,8 @@ from measure.figures import Figure, say
 
 __all__ = ["figures"]
 
-PROJECTED, RENDERED = 24, 4
-SECONDS = 15.0
+PROJECTED, RENDERED = 24, 8
+SECONDS = 11.0
 
 
 class Trial(NamedTuple):
