@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 __all__ = ["filter_of", "smoother_of"]
 
-SMOOTHERS = ("batch", "ieks", "isam2_final", "ekf_rts")
+SMOOTHERS = ("batch", "ieks", "isam2_final", "ekf_rts", "kf_rts")
 
 
 def filter_of(rows: tuple[Row, ...]) -> Row | None:
