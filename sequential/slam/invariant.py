@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sequential.manifold import SE2
 from sequential.slam.gauge import FRAME, POINT, VECTOR, directions, rigid_of, world_roles
-from sequential.slam.joint_belief import JointBelief
+from sequential.slam.joint_belief import JointBelief, Variable
 from sequential.slam.models.displacement import into_world
 from sequential.slam.problem import SlamProblem
 
@@ -40,7 +40,7 @@ class Frame:
         at_pose = belief.columns(pose)
         turn = to_world @ step[at_pose]
         carried = np.eye(belief.used)
-        moved = {}
+        moved: dict[Variable, Array] = {}
         for kind, members, at in belief.by_kind():
             role, manifold = self.roles[kind], belief.kinds[kind]
             values = np.stack([belief.value[v] for v in members])
