@@ -37,7 +37,7 @@ OUTER = 200
 ROUNDS = 5
 SLACK = 1e-6  # relative: a cost has to fall by more to count
 BELIEVED = 0.5
-GENEROUS = 10.0  # times the fitted variance: a stated one beyond that is no measure of an outlier
+GENEROUS = 4.0  # times the fitted variance: a stated one beyond that is no measure of an outlier
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ class GncSlam:
         robust cost wins.  `"relaxed"` is LAGO in the plane and the chordal relaxation in space, where there
         are poses to relax and it fits half of what is doubted; `"trusted"` tries nothing else
     reconsider : with `"tls"`, drop or add single measurements afterwards while that lowers the cost; where
-        what is believed fits √10 times better than its σ say, bounds shrink to √10 times what is fitted
+        what is believed fits twice as well as its σ say, bounds shrink to twice the σ that are fitted
     covariance : marginals of all kinds, of the named kinds, or none
     max_iterations : of Gauss-Newton at the end, with the last weights
     check : raise where the last solve has not settled

@@ -58,9 +58,11 @@ def test_intel_with_false_loops(seed, data_dir):
         loop, index=pairs, z=z, noise_cov=loop.covs()[rng.integers(0, len(loop), 336)], name="false"
     )
     result = GncSlam(covariance=False).solve_weighted(replace(problem, factors=(*problem.factors, false)))
+    clean = solved(dataset).values.rows["x"]
+    off = np.hypot(*(result.run.values.rows["x"] - clean)[:, :2].T)
     assert (result.weights[-1] == 0).all()
-    assert all((weights == 1).all() for weights in result.weights[:-1])
-    assert result.run.report.details["chi2"] == pytest.approx(45.0042, rel=1e-5)
+    assert sum((weights < 1).sum() for weights in result.weights[:-1]) <= 5
+    assert np.sqrt(np.mean(off**2)) < 0.02  # the odometry alone is a metre off
 
 
 def test_sphere_is_weighed_as_isam_wrote_it():
