@@ -77,6 +77,9 @@ def declare(start, q, cov, *, free):
     state = sq.Product(attitude=sq.SO3(), gyro_bias=sq.Vector(3), **mount)
     mean, spread = state.identity(), np.diag(np.repeat([0.0, 0.1**2, 0.2**2], 3)[: state.dim])
     mean[:4], spread[:3, :3] = q, cov
+    if free:  # on voit le marqueur : si la centrale est tournée d'un côté, il l'est de l'autre
+        spread[:3, :3] += spread[6:, 6:]
+        spread[:3, 6:] = spread[6:, :3] = -spread[6:, 6:]
     sensor = sq.TwoModeOrientation(1e-3, mount="mount" if free else None)
     process, static = sq.GyroAttitude(NOISE), tuple(mount)
     return sq.StateSpace(
@@ -98,6 +101,13 @@ def fuse(estimator, recording):
             model = declare(int(first.t[0]), q, first.noise_cov[0], free=free)
             runs.append(sq.run(estimator, model, log, at=at))
     return max(runs, key=lambda run: run.log_likelihood)
+
+
+def marker_of(run):
+    """L'orientation du marqueur : celle de la centrale, et comment il y est collé."""
+    if "mount" not in run.manifold.parts:
+        return run.mean[:, :4]
+    return quaternion_multiply(run.mean[:, :4], run.part("mount"))
 
 
 def integrate(recording):
@@ -127,16 +137,20 @@ def main():
     curves = {
         "caméra seule": (recording.marker.t, recording.marker.context[:, :4]),
         "gyromètre seul": (t, alone),
-        "fusion (filtre)": (filtered.t, filtered.mean[:, :4]),
-        "fusion (lisseur)": (smoothed.t, smoothed.mean[:, :4]),
+        "fusion (filtre)": (filtered.t, marker_of(filtered)),
+        "fusion (lisseur)": (smoothed.t, marker_of(smoothed)),
     }
     bias = np.degrees(filtered.mean[-1, 4:7])
     print(f"{len(recording.marker)} images lues, biais trouvé {bias.round(2)} °/s")
     figure, axes = panels(1, 3, size=(13.0, 4.2), title="TP5. Vision + IMU : trois courbes d'une orientation")
     draw_curves(axes[0], curves, recording)
     draw_bias(axes[2], filtered, recording)
-    if recording.truth is None:
-        axes[1].axis("off")
+    if recording.truth is None:  # pas de vérité : l'écart de chaque image au lisseur
+        seen = recording.marker.t[1:]
+        gaps = {
+            "caméra seule": off(recording.marker.context[1:, :4], marker_of(smoothed)[smoothed.index(seen)])
+        }
+        draw_errors(axes[1], {"caméra seule": (seen, None)}, gaps, "Écart au lisseur")
         save(figure, "tp5_vision_imu")
         return
     errors = {name: off(q, recording.truth(t)) for name, (t, q) in curves.items()}
@@ -185,15 +199,15 @@ def draw_curves(axes, curves, recording):
     axes.legend(loc="upper left", ncols=2)
 
 
-def draw_errors(axes, curves, errors):
+def draw_errors(axes, curves, errors, title="Erreur"):
     """L'angle d'erreur des quatre, en échelle logarithmique."""
     import figures
 
     style = (figures.READINGS, {"color": figures.ORANGE}, {"color": figures.BLUE}, {"color": figures.GREEN})
-    for (name, error), look in zip(errors.items(), style, strict=True):
+    for (name, error), look in zip(errors.items(), style, strict=False):
         size = np.degrees(np.linalg.norm(error, axis=1))
         axes.plot(curves[name][0] * 1e-9, np.maximum(size, 1e-2), label=name, **look)
-    axes.set(title="Erreur", xlabel="temps (s)", ylabel="erreur (°)", yscale="log", ylim=(2e-2, 2e3))
+    axes.set(title=title, xlabel="temps (s)", ylabel="erreur (°)", yscale="log", ylim=(2e-2, 2e3))
     axes.legend(loc="upper left", ncols=2)
 
 
