@@ -36,6 +36,11 @@ class AxisErrors:
     sigma: Array
     nees: Array | None = None  # (M,) of all axes together, χ² with as many degrees of freedom
 
+    @property
+    def turns(self) -> bool:
+        """Whether a heading or a rotation is among the axes; of a place alone the length says enough."""
+        return "rad" in self.units
+
     def rmse(self) -> Array:
         """(a,) root mean squares."""
         found: Array = np.sqrt(np.mean(self.error**2, axis=0))

@@ -13,8 +13,6 @@ from factorlab.compare.text import NOTHING, WIDTH, figure
 
 __all__ = ["axis_table", "lag_table", "small", "smoothing_lines", "unit_of"]
 
-PLACES = 3  # axes of a position: with these alone an error's length says enough
-
 
 def axis_table(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
     """Share of errors within ±3σ and RMSE of each axis, headings first; empty where there is no turn.
@@ -27,7 +25,7 @@ def axis_table(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
     told += [
         (f"{lag.lag_s:g} s later", lag.axes) for lag in comparison.lags if lag.axes is not None and lag.lag_s
     ]
-    if not told or len(told[0][1].names) <= PLACES:
+    if not told or not told[0][1].turns:
         return ()
     lines = [("inside ±3σ (99.7 % exp.), RMSE", *told[0][1].names)]
     for title, axes in told:

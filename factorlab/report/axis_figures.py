@@ -9,19 +9,18 @@ from matplotlib.figure import Figure
 from factorlab.compare import Comparison
 from factorlab.compare.axes import AxisErrors
 from factorlab.compare.pair import filter_of, smoother_of
-from factorlab.report.style import blank, line_of, thin
+from factorlab.report.style import blank, broken, line_of, thin
 from sequential.log import seconds
 
 __all__ = ["axis_envelopes"]
 
-PLACES = 3
 Column = tuple[str, str, AxisErrors]  # title, colour, errors
 
 
 def axis_envelopes(comparison: Comparison) -> Figure | None:
     """One row an axis, one column an estimator; None where the truth has no rotation."""
     columns = _columns(comparison)
-    if not columns or len(columns[0][2].names) <= PLACES:
+    if not columns or not columns[0][2].turns:
         return None
     names = columns[0][2].names
     drawing, axes = blank(1.55 * len(names) + 0.5, len(names), len(columns), sharex=True, sharey="row")
@@ -69,7 +68,9 @@ def _reach(told: AxisErrors, k: int) -> float:
 def _panel(axes: Axes, told: AxisErrors, k: int, color: str, start: int, title: str) -> None:
     t, (error, three) = seconds(told.t, start), _scaled(told, k)
     kept = thin(len(t), 700)
-    axes.fill_between(t[kept], -three[kept], three[kept], color=color, alpha=0.18, linewidth=0)
-    axes.plot(t[kept], error[kept], color=color, linewidth=0.8)
+    pauses = np.flatnonzero(broken(t, kept))  # nothing is drawn across a time without estimates
+    x, y, band = (np.insert(values[kept], pauses, np.nan) for values in (t, error, three))
+    axes.fill_between(x, -band, band, color=color, alpha=0.18, linewidth=0)
+    axes.plot(x, y, color=color, linewidth=0.8)
     inside = f"{100 * float(told.inside()[k]):.1f} % inside ±3σ"
     axes.set_title(f"{title}\n{inside}" if title else inside)

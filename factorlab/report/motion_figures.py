@@ -133,7 +133,7 @@ def envelopes(comparison: Comparison) -> Figure | None:
     """Error of each axis within ±3σ, a filter beside a smoother."""
     chosen = [filter_of(comparison.rows), smoother_of(comparison.rows)]
     rows = [row for row in chosen if row is not None and row.errors is not None]
-    if not rows or (rows[0].axes is not None and len(rows[0].axes.names) > comparison.dataset.axes):
+    if not rows or (rows[0].axes is not None and rows[0].axes.turns):
         return None  # `axis_envelopes` shows these axes and the rotation's
     count = min(3, rows[0].errors.error.shape[1])  # type: ignore[union-attr]
     drawing, axes = blank(1.9 * count + 0.6, count, len(rows), sharex=True)

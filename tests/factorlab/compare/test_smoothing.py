@@ -69,8 +69,10 @@ def test_axes_on_the_plane_have_a_heading(walker):
     assert told.names == ("x", "y", "heading")
     np.testing.assert_allclose(told.error[:, 2], 0.1, atol=1e-9)
     assert told.nees_per_axis() > 0
+    assert told.turns
     without = dataclasses.replace(walker, truth=Truth(t, state[:, :2]))
     assert axis_errors(without, run).names == ("x", "y")
+    assert not axis_errors(without, run).turns
     assert axis_errors(dataclasses.replace(walker, truth=None), run) is None
 
 
