@@ -45,9 +45,9 @@ LINES: dict[str, dict[str, Any]] = {
     "isam2": {"color": "#009E73", "linestyle": "-", "marker": ">"},
     "isam2_final": {"color": "#00543D", "linestyle": ":", "marker": "X"},
     "batch": {"color": "#000000", "linestyle": "-", "marker": "*"},
-    "ekf_slam": {"color": "#D55E00", "linestyle": "-", "marker": "o"},
-    "batch_robust": {"color": "#0072B2", "linestyle": "--", "marker": "D"},
-    "gnc": {"color": "#CC79A7", "linestyle": "-.", "marker": "^"},
+    "ekf_slam": {"color": "#D55E00", "linestyle": ":", "marker": "p"},
+    "batch_robust": {"color": "#0072B2", "linestyle": ":", "marker": "h"},
+    "gnc": {"color": "#CC79A7", "linestyle": "--", "marker": "8"},
 }
 WIDTH = 11.0  # inches, which the page shows at its full width
 MOST_POINTS = 1500
