@@ -8,6 +8,7 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from factorlab.graph.slam.multifrontal import diagonal_blocks
 from factorlab.graph.slam.rows import Rows
 from factorlab.graph.slam.variables import keys_of
 from factorlab.graph.solve import readable
@@ -17,6 +18,7 @@ from sequential.slam import SlamProblem, Values
 __all__ = ["gaussian_graph", "marginals", "marginals_of"]
 
 Array = NDArray[np.float64]
+MANY = 500  # variables beyond which one pass over all blocks beats a query each
 
 
 def gaussian_graph(rows: Rows, values: Values) -> Any:
@@ -58,6 +60,8 @@ def marginals(
 
 def marginals_of(rows: Rows, values: Values, kinds: tuple[str, ...]) -> dict[str, Array]:
     """The same from rows that are there already; raises `UnderConstrainedError`."""
+    if sum(map(len, rows.index.values())) > MANY and (blocks := _all_at_once(rows, values)):
+        return {kind: blocks[kind] for kind in kinds if kind in blocks}
     with readable():
         found = gtsam.Marginals(gaussian_graph(rows, values), gtsam.Values())
         return {
@@ -65,3 +69,15 @@ def marginals_of(rows: Rows, values: Values, kinds: tuple[str, ...]) -> dict[str
             for kind in kinds
             if kind in rows.index
         }
+
+
+def _all_at_once(rows: Rows, values: Values) -> dict[str, Array]:
+    """All blocks by dense fronts; nothing where the rows leave a direction free, which GTSAM then names."""
+    counts = {kind: len(known) for kind, known in rows.index.items()}
+    dims = np.repeat([rows.problem.kinds[kind].dim for kind in counts], list(counts.values()))
+    try:
+        blocks = diagonal_blocks(rows.linearise(values)[0], dims)
+    except np.linalg.LinAlgError:
+        return {}
+    ends = np.cumsum([0, *counts.values()]).tolist()
+    return {kind: np.array(blocks[ends[k] : ends[k + 1]]) for k, kind in enumerate(counts)}

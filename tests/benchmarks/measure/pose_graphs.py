@@ -16,7 +16,6 @@ from factorlab.datasets import load_slam
 from factorlab.datasets.slam import SlamDataset
 from factorlab.graph.slam import BatchSlam
 from factorlab.graph.slam.batch import native_graph
-from factorlab.graph.slam.variables import insert_values
 from measure.figures import Figure, interleaved
 from sequential.slam.initial import initial_poses
 
@@ -91,11 +90,12 @@ def starts(dataset: SlamDataset) -> dict[str, Figure]:
 def relaxation_time(dataset: SlamDataset) -> dict[str, Figure]:
     """Our LAGO with one Gauss-Newton solve, over GTSAM's Levenberg-Marquardt from the odometry."""
     problem = dataset.problem
-    graph = native_graph(problem)
-    begun = insert_values(problem, initial_poses(problem, "odometry"))
+    native = native_graph(problem)
+    assert native is not None
+    begun = native.insert(initial_poses(problem, "odometry"))
 
     def theirs() -> None:
-        gtsam.LevenbergMarquardtOptimizer(graph, begun).optimize()
+        gtsam.LevenbergMarquardtOptimizer(native.graph, begun).optimize()
 
     rounds = 3 if len(problem.indices("x")) < 5000 else 1
     if rounds == 1:  # a warm-up would take as long again
