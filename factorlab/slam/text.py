@@ -12,20 +12,22 @@ from factorlab.slam.estimators import KINDS
 
 __all__ = ["cells", "headings", "size_line", "terminal"]
 
-WORDS = {"x": "poses", "l": "landmarks", "m": "markers", "v": "velocities", "b": "biases", "s": "constants"}
+WORDS = {"x": "poses", "l": "landmarks", "m": "markers", "v": "velocities", "b": "biases"}
 
 
 def size_line(comparison: SlamComparison) -> str:
-    """`1 200 poses, 15 landmarks, 6 789 measurements`."""
+    """`1 200 poses, 15 landmarks, 2 sets of constants, 6 789 measurements`."""
     problem = comparison.dataset.problem
-    counts = [
-        f"{len(problem.indices(kind)):,} {WORDS.get(kind, 'variables ' + kind)}" for kind in problem.kinds
-    ]
-    return (
-        ", ".join([*counts, f"{problem.count:,} measurements"])
-        .replace(",", "\u202f")
-        .replace("\u202f ", ", ")
-    )
+    sizes = {kind: len(problem.indices(kind)) for kind in problem.kinds}
+    told = [f"{_spaced(sizes[kind])} {word}" for kind, word in WORDS.items() if sizes.get(kind)]
+    if constants := sum(size for kind, size in sizes.items() if kind not in WORDS):
+        told.append(f"{_spaced(constants)} set{'s' if constants > 1 else ''} of constants")
+    return ", ".join([*told, f"{_spaced(problem.count)} measurements"])
+
+
+def _spaced(count: int) -> str:
+    """A whole number with narrow spaces between thousands."""
+    return f"{count:,}".replace(",", "\u202f")
 
 
 def headings(comparison: SlamComparison) -> tuple[tuple[str, str], ...]:
@@ -94,4 +96,5 @@ def terminal(comparison: SlamComparison) -> Iterable[str]:
         if row.failed or row.message:
             yield from wrap(f"{row.title}: {row.message}", WIDTH)
     yield ""
-    yield from (f"- {note}" for note in comparison.dataset.notes)
+    for note in comparison.dataset.notes:
+        yield from wrap(f"- {note}", WIDTH, subsequent_indent="  ")
