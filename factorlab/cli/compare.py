@@ -15,6 +15,7 @@ from factorlab.cli.settings import (
     check_option,
     command_line,
     config_option,
+    lags_of,
     max_gap_option,
     print_json,
     robot_option,
@@ -92,8 +93,9 @@ class Settings:
 def compare(**options: Any) -> int:
     """Run several estimators on one log and put them in one table.
 
-    DATASET is kitti, plaza1, plaza2, mrclam or rail; LOG is a CSV or NPZ file with named streams, together
-    with --model, or a pose graph in g2o or TORO format.  `factorlab info LOG` shows what a log holds.
+    DATASET is kitti, plaza1, plaza2, mrclam, rail or starry_night; LOG is a CSV or NPZ file with named
+    streams, together with --model, or a pose graph in g2o or TORO format.  `factorlab info LOG` shows what a
+    log holds.
 
     Problems with unknown landmarks or loop closures: victoria_park, sphere2500, w10000, city10000, intel,
     mit, planar_monocular, and mrclam or starry_night with --slam.
@@ -124,6 +126,7 @@ def compare_and_show(settings: Settings) -> int:
                     tune=settings.tune,
                     seed=settings.seed,
                     max_gap=settings.max_gap,
+                    lags=lags_of(settings.lags) or None,
                     progress=progress,
                 )
             )

@@ -72,6 +72,8 @@ def _landmarks(axes: Axes, comparison: SlamComparison, best: SlamRow) -> None:
     if cov is not None and np.isfinite(cov).all():
         spread, axis = np.linalg.eigh(cov[:, :2, :2])
         wide = 2 * RADII_95 * np.sqrt(np.maximum(spread, 0.0))
+        reach = 0.5 * wide.max(axis=1, keepdims=True)
+        axes.update_datalim(np.vstack([place[:, :2] - reach, place[:, :2] + reach]))
         angle = np.degrees(np.arctan2(axis[:, 1, 1], axis[:, 0, 1]))
         axes.add_collection(
             EllipseCollection(
