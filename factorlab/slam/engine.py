@@ -14,10 +14,12 @@ from factorlab.compare.verdict import Finding
 from factorlab.datasets.slam import SlamDataset
 from factorlab.slam.estimators import KINDS, make, require_names
 from factorlab.slam.lags import STEP_NS, LagPoint, slam_lag_sweep
+from factorlab.slam.loops import loop_errors_of
 from factorlab.slam.scores import MapScore, Scores, map_score_of, scores_of
 from sequential.errors import FactorlabError
 from sequential.history import Run
 from sequential.slam import SlamRun
+from sequential.slam.revisits import LoopErrors
 
 __all__ = ["SlamComparison", "SlamRow", "compare_slam"]
 
@@ -41,6 +43,7 @@ class SlamRow:
     message: str = ""
     run: SlamRun | None = field(default=None, repr=False)
     trajectory: Run | None = field(default=None, repr=False)
+    loops: LoopErrors | None = field(default=None, repr=False)
 
     @property
     def title(self) -> str:
@@ -65,6 +68,7 @@ class SlamRow:
             "normalised_error": None if honesty is None else honesty.to_json(),
             "anees_per_dof": None if honesty is None else honesty.mean / honesty.expected,
             "inside_three_sigma": None if honesty is None or scores is None else list(scores.inside()),
+            "loop_error": None if self.loops is None else self.loops.to_json(),
             "map": None if self.map_score is None else self.map_score.to_json(),
             "chi2": self.chi2,
             "seconds": self.seconds,
@@ -235,4 +239,5 @@ def _row(
         run.report.message,
         run,
         path,
+        loop_errors_of(dataset, run, path),
     )

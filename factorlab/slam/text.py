@@ -41,7 +41,7 @@ def headings(comparison: SlamComparison) -> tuple[tuple[str, str], ...]:
         ("heading" if comparison.dataset.axes == 2 else "rotation", "°"),
         ("ANEES/dof", "1 exp."),
         ("band", "95 %"),
-        ("map RMSE", "m"),
+        ("loop error" if _by_loops(comparison) else "map RMSE", "m"),
         ("χ²", ""),
         ("per reading", "µs"),
         ("total", "s"),
@@ -62,13 +62,24 @@ def cells(row: SlamRow) -> tuple[str, ...]:
         figure(None if turned is None else degrees(turned)),
         figure(None if honest is None else honest.mean / honest.expected),
         NOTHING if honest is None else _per_freedom(limits, honest.expected),
-        figure(None if row.map_score is None else row.map_score.rmse),
+        figure(_off_map(row)),
         NOTHING if row.chi2 is None else f"{row.chi2:.6g}",
         figure(row.us_per_measurement),
         figure(row.seconds),
         NOTHING if row.iterations is None else str(row.iterations),
         KINDS[row.name].latency,
     )
+
+
+def _by_loops(comparison: SlamComparison) -> bool:
+    """Whether the map is judged by its revisits, for want of a truth."""
+    return any(row.loops is not None for row in comparison.rows)
+
+
+def _off_map(row: SlamRow) -> float | None:
+    if row.loops is not None:
+        return row.loops.rms
+    return None if row.map_score is None else row.map_score.rmse
 
 
 def _per_freedom(limits: tuple[float, float] | None, freedom: float) -> str:

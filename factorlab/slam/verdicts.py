@@ -8,6 +8,7 @@ from factorlab.compare.verdict import ORDER, OVERCONFIDENT, PESSIMISTIC, Finding
 from factorlab.datasets.slam import SlamDataset
 from factorlab.slam.engine import SlamRow
 from factorlab.slam.estimators import KINDS
+from factorlab.slam.loops import loop_finding
 
 __all__ = ["bought", "findings_of"]
 
@@ -20,6 +21,10 @@ def findings_of(dataset: SlamDataset, rows: tuple[SlamRow, ...]) -> tuple[Findin
     found += [_unsettled(row) for row in rows if not row.failed and not row.converged]
     found += _costs(dataset, rows)
     found += [_honesty(row, row.scores.honesty) for row in rows if row.scores and row.scores.honesty]
+    closed = [row for row in rows if row.loops is not None and row.name in {"batch", "isam2_final"}]
+    for row in closed[-1:]:
+        told_loops = row.loops and loop_finding(dataset, row.title, row.name, row.loops)
+        found += [told_loops] if told_loops else []
     if told := bought(rows):
         found.append(told)
     return tuple(sorted(found, key=lambda finding: ORDER[finding.status]))

@@ -69,6 +69,15 @@ class LoopErrors:
         """Farthest, m."""
         return float(self.distance.max())
 
+    def to_json(self) -> dict[str, float | int]:
+        """Plain numbers."""
+        return {
+            "rms_m": self.rms,
+            "median_m": self.median,
+            "worst_m": self.worst,
+            "revisits": len(self.distance),
+        }
+
 
 def visits_of(problem: SlamProblem, group: int, away_steps: int = AWAY_STEPS) -> Visits:
     """The visits that a group of sightings is made of; a longer pause than `away_steps` ends one.
