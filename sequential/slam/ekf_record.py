@@ -57,10 +57,11 @@ class Record:
         self.rejected += not accepted
         self.seen[group].append((self.at_time(self.at), reading.row, residual, cov, accepted))
 
-    def associate(self, reading: Reading, landmark: Variable | None) -> None:
-        """Keep which landmark a reading was taken for."""
-        self.found[reading.group][reading.row] = REJECTED if landmark is None else landmark[1]
-        self.rejected += landmark is None
+    def associate(self, reading: Reading, known: Reading | None) -> None:
+        """Keep which landmark a reading was taken for; None where it was rejected."""
+        slot = self.problem.factors[reading.group].unknown or 0
+        self.found[reading.group][reading.row] = REJECTED if known is None else known.variables[slot][1]
+        self.rejected += known is None
 
     def at_time(self, step: int) -> int:
         """Time of a step in ns; its number where the problem has no times."""

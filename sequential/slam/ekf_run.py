@@ -12,9 +12,10 @@ from sequential.errors import ModelError, UnderConstrainedError
 from sequential.evaluate.consistency import chi2_quantile
 from sequential.history import Report
 from sequential.slam.arrivals import UNKNOWN, Reading, arrivals, linearised
-from sequential.slam.association import NEW, REJECTED, Association, Pairings
+from sequential.slam.association import Association
 from sequential.slam.ekf_record import Record
 from sequential.slam.estimate import SlamRun
+from sequential.slam.identify import Identifier, nameless
 from sequential.slam.invariant import Frame
 from sequential.slam.joint_belief import JointBelief, Variable
 from sequential.slam.placing_jointly import VIEWS, place_by_several, place_jointly
@@ -24,7 +25,6 @@ from sequential.slam.robust_weight import weight
 __all__ = ["FilterRun"]
 
 Array = NDArray[np.float64]
-NO_READINGS: tuple[Reading, ...] = ()
 
 
 class FilterRun:
@@ -33,7 +33,8 @@ class FilterRun:
     def __init__(
         self, problem: SlamProblem, linearisation: str, association: Association, keep: int | None
     ) -> None:
-        self.problem, self.association, self.keep = problem, association, keep
+        self.problem, self.keep = problem, keep
+        self.identifier = Identifier(problem, association)
         self.belief = JointBelief(problem.kinds)
         self.record = Record(problem)
         self.frame = Frame(problem) if linearisation == "invariant" else None
@@ -41,7 +42,6 @@ class FilterRun:
         self.newest = -1
         self.waiting: list[Reading] = []
         self.again: dict[Variable, int] = {}  # readings that a new attempt to place a variable waits for
-        self.fresh = {kind: int(max(problem.indices(kind), default=-1)) + 1 for kind in problem.kinds}
 
     def steps(self) -> Iterator[int]:
         """Go through all steps; gives the number of each when it is done."""
@@ -203,60 +203,14 @@ class FilterRun:
 
     def _associated(self, readings: Sequence[Reading]) -> list[Reading]:
         """The readings with ids: those that came without one get theirs, or are rejected."""
-        done = [r for r in readings if all(index != UNKNOWN for _, index in r.variables)]
-        open_ = [r for r in readings if any(index == UNKNOWN for _, index in r.variables)]
-        for number in sorted({reading.group for reading in open_}):
-            own = [r for r in open_ if r.group == number]
-            slot = self.problem.factors[number].unknown or 0
-            kind = self.problem.factors[number].slots[slot]
-            known = self.belief.of_kind(kind)
-            chosen = self.association.choose(self._pairings(number, own, slot, known))
-            for reading, choice in zip(own, chosen.tolist(), strict=True):
-                landmark = self._landmark(kind, known, choice)
-                self.record.associate(reading, landmark)
-                if landmark is not None:
-                    variables = (*reading.variables[:slot], landmark, *reading.variables[slot + 1 :])
-                    done.append(Reading(number, reading.row, variables))
+        done = [r for r in readings if not nameless(r)]
+        for reading, known in self.identifier.name(
+            [r for r in readings if nameless(r)], self.belief, self.about
+        ):
+            self.record.associate(reading, known)
+            if known is not None:
+                done.append(known)
         return done
-
-    def _landmark(self, kind: str, known: Sequence[Variable], choice: int) -> Variable | None:
-        if choice == REJECTED:
-            return None
-        if choice != NEW:
-            return known[choice]
-        self.fresh[kind] += 1
-        return kind, self.fresh[kind] - 1
-
-    def _pairings(
-        self, number: int, readings: Sequence[Reading], slot: int, known: Sequence[Variable]
-    ) -> Pairings:
-        """Every reading beside every landmark."""
-        group, m = self.problem.factors[number], self.problem.factors[number].model.measured.dim
-        pairs = [
-            Reading(number, r.row, (*r.variables[:slot], landmark, *r.variables[slot + 1 :]))
-            for r in readings
-            for landmark in known
-        ]
-        shape = (len(readings), len(known))
-        if not pairs:
-            empty = np.zeros((*shape, m))
-            return Pairings(
-                empty,
-                np.zeros((*shape, m, 0)),
-                np.zeros((*shape, 0), dtype=np.int64),
-                np.zeros((shape[0], m, m)),
-                self.belief.cov,
-            )
-        rows = linearised(group, pairs, self.belief.value, self.about)
-        jacobian = np.concatenate(rows.jacobians, axis=2)
-        columns = np.stack([self.belief.columns_of(pair.variables) for pair in pairs])
-        return Pairings(
-            rows.error.reshape(*shape, m),
-            jacobian.reshape(*shape, m, -1),
-            columns.reshape(*shape, -1),
-            rows.noise.reshape(*shape, m, m)[:, 0],
-            self.belief.cov,
-        )
 
     def _keep_waiting(self, left: Sequence[Reading]) -> None:
         """Readings that place nothing yet wait for others, as long as their poses stay."""
