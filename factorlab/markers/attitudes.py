@@ -78,7 +78,7 @@ def fuse_attitude(
     ----------
     estimator : any filter, smoother or graph
     gyro : (N, 3) rad/s; samples are averaged in pairs, which makes their integration second order in dt
-    marker : of `attitude_readings`
+    marker : of `attitude_readings`; sightings before the gyro's first sample or after its last are left out
     noise : of the gyro
     bias_sigma : of the gyro's bias about zero before anything is known, rad/s
     mount_sigma : how far the marker's axes may be turned from the gyro's, rad; zero is not at all
@@ -91,8 +91,10 @@ def fuse_attitude(
 
     Raises
     ------
-    ModelError, MissingStreamError, GapError
+    DataError, ModelError, GapError
+        where the two recordings do not overlap in time, among others.
     """
+    marker = marker.select(_together(gyro, marker))
     first, others = marker.select(np.arange(1)), marker.select(np.arange(1, len(marker)))
     rates = Stream(gyro.t[:-1], 0.5 * (gyro.values[1:] + gyro.values[:-1]))
     log, known = SensorLog({"gyro": rates, "marker": others}), first.keys()[0]
@@ -102,6 +104,28 @@ def fuse_attitude(
             model = _declare(first, q, noise, bias_sigma, mount_sigma)
             runs.append(run(estimator, model, log, at=at))
     return max(runs, key=lambda one: one.log_likelihood)
+
+
+def _together(gyro: Stream, marker: Stream) -> NDArray[np.bool_]:
+    """(N,) sightings while the gyro ran."""
+    if gyro.values.shape[1] != 3 or marker.values.shape[1] != 4 or marker.noise_cov is None:
+        raise ShapeError(
+            "fuse_attitude takes a gyro's stream (N, 3) rad/s and one of attitude_readings, got "
+            f"{gyro.values.shape} and {marker.values.shape}"
+        )
+    inside = np.zeros(len(marker), dtype=bool)
+    if len(gyro) and len(marker):
+        inside = (marker.t >= gyro.t[0]) & (marker.t <= gyro.t[-1])
+    if len(gyro) < 2 or inside.sum() < 2:
+        spans = [
+            f"from {one.t[0] * 1e-9:.3f} to {one.t[-1] * 1e-9:.3f} s" if len(one) else "nothing"
+            for one in (gyro, marker)
+        ]
+        raise DataError(
+            f"the gyro covers {spans[0]} and the marker {spans[1]}: {int(inside.sum())} sightings "
+            "fall within, 2 are needed; set both clocks to one origin (factorlab calibrate cam-imu finds the offset)"
+        )
+    return np.asarray(inside)
 
 
 def _declare(

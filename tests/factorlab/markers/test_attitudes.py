@@ -133,3 +133,16 @@ def test_readings_of_poses():
         attitude_readings([0.0], [None])
     with pytest.raises(ShapeError, match="2 poses need as many times"):
         attitude_readings([0.0], [pose, pose])
+
+
+def test_recordings_that_do_not_overlap_are_refused(rng):
+    motion, gyro, _ = turning(rng, seconds=4.0)
+    marker = noisy_readings(motion, rng)
+    late = sq.Stream(marker.t + 10**11, marker.values, marker.context, noise_cov=marker.noise_cov)
+    with pytest.raises(DataError, match=r"gyro covers from 0\.000 .* marker from 100\.000 .* 0 sightings"):
+        fused(FILTER, gyro, late)
+    with pytest.raises(ShapeError, match="attitude_readings"):
+        fused(FILTER, gyro, gyro)
+    early = sq.Stream(marker.t - 10**9, marker.values, marker.context, noise_cov=marker.noise_cov)
+    run = fused(FILTER, gyro, early)
+    assert run.t[0] >= 0  # sightings before the gyro ran are left out
