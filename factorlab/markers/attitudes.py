@@ -123,7 +123,8 @@ def _together(gyro: Stream, marker: Stream) -> NDArray[np.bool_]:
         ]
         raise DataError(
             f"the gyro covers {spans[0]} and the marker {spans[1]}: {int(inside.sum())} sightings "
-            "fall within, 2 are needed; set both clocks to one origin (factorlab calibrate cam-imu finds the offset)"
+            "fall within, 2 are needed; set both clocks to one origin "
+            "(factorlab calibrate cam-imu finds the offset)"
         )
     return np.asarray(inside)
 
