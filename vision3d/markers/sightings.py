@@ -147,7 +147,7 @@ class MarkerSightings:
 
     def wider(self, factor: float) -> MarkerSightings:
         """The same with variances of corners multiplied."""
-        return replace(self, cov=self.cov * factor)
+        return self if factor == 1.0 else replace(self, cov=self.cov * factor)
 
     def shifted(self, seconds: float) -> MarkerSightings:
         """The same on another clock: that many seconds are added to the times."""
