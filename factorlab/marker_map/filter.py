@@ -30,7 +30,6 @@ from vision3d.markers.sightings import MarkerSightings
 from vision3d.rigid import compose, inverse
 
 if TYPE_CHECKING:
-    from factorlab.graph.marker_inertial import Segment
     from factorlab.graph.marker_rows import CornerRows
     from factorlab.marker_map.mapping import Inertial
 
@@ -94,7 +93,7 @@ def filter_markers(
     for k in range(len(sightings.t)):
         seen = np.arange(bounds[k], bounds[k + 1])
         if state.body is None:
-            state.try_to_begin(k, seen, segments)
+            state.try_to_begin(k, seen)
         elif (segment := segments[k - 1]) is None:
             break  # without an IMU nothing leads on
         else:
@@ -103,7 +102,9 @@ def filter_markers(
             state.take(seen)
             state.note(k)
     if not any(np.isfinite(told[0][0]) for told in state.told):
-        raise DataError("the filter found no frame to begin at: no marker is seen surely for a second")
+        raise DataError(
+            "the filter found no frame to begin at: no marker, or not the reference, was sure for a second"
+        )
     return state.finished(perf_counter() - began)
 
 
@@ -124,27 +125,29 @@ class _Filter:
     frames: list[int] = field(default_factory=list)
     told: list[tuple[Array, Array, Array, Array]] = field(default_factory=list)
     rejected: int = 0
-    early: dict[tuple[int, int], int] = field(default_factory=dict)  # sure sightings before the beginning
+    early: list[tuple[int, int, int]] = field(default_factory=list)  # frame, marker, sighting: sure ones
 
     def sure(self, seen: Ints) -> NDArray[np.bool_]:
         """Which sightings have one reading that counts."""
         first, second = self.modes.probability[seen].T
         return np.asarray((first > 0) & (first > CERTAIN * second))
 
-    def try_to_begin(self, k: int, seen: Ints, segments: list[Segment | None]) -> None:
-        """Begin where one marker was seen surely through the last second, the IMU running."""
+    def try_to_begin(self, k: int, seen: Ints) -> None:
+        """Begin where one marker was seen surely over the last second, the IMU running."""
         t, marker = self.rows.sightings.t, self.rows.sightings.marker
-        self.early |= {(k, int(marker[s])): int(s) for s in seen[self.sure(seen)]}
-        for m in marker[seen[self.sure(seen)]]:
-            first = k
-            while first and (first - 1, int(m)) in self.early and segments[first - 1] is not None:
-                first -= 1
-            if (t[k] - t[first]) * 1e-9 < WINDOW_S or k - first < FEWEST:
+        sure = seen[self.sure(seen)]
+        self.early += [(k, int(marker[s]), int(s)) for s in sure]
+        self.early = [one for one in self.early if t[k] - t[one[0]] <= 1.5e9 * WINDOW_S]
+        for m in marker[sure]:
+            frames, rows = zip(*((f, s) for f, other, s in self.early if other == m), strict=True)
+            if (t[k] - t[frames[0]]) * 1e-9 < WINDOW_S or len(frames) < FEWEST:
                 continue
-            rows = [self.early[f, int(m)] for f in range(first, k + 1)]
-            camera = inverse(self.modes.poses[rows, 0])
+            segments = cut_at_frames(self.inertial.imu, t[list(frames)])
+            if any(one is None for one in segments):
+                continue
+            camera = inverse(self.modes.poses[list(rows), 0])
             poses = compose(camera, inverse(self.rows.body_T_camera))
-            self.body, self.P = started(poses, segments[first:k], self.inertial)
+            self.body, self.P = started(poses, segments, self.inertial)
             return
 
     def take(self, seen: Ints) -> None:
