@@ -117,9 +117,10 @@ def _residuals(run: CamImuRun) -> Verdict:
     found = run.found
     status = judged(found.rms_px, GOOD_PX, FAIR_PX)
     dropped = int(np.count_nonzero(found.problem.corner_weight == 0.0))
+    sigma = found.problem.corner_scale * float(np.median(found.problem.corners.sigma_px))
     meaning = (
-        f"distance of a corner from where the moving camera predicts it; {found.problem.corner_scale:.2f} "
-        f"times what its detection promises; {dropped} of {len(found.problem.corner_weight)} corners left out"
+        f"distance of a corner from where the moving camera predicts it; σ of a coordinate {sigma:.2g} px; "
+        f"{dropped} of {len(found.problem.corner_weight)} corners left out"
     )
     action = "" if status == "PASS" else "motion blur, a rolling shutter, or a calibration of another camera?"
     return Verdict("residual of corners, RMS", found.rms_px, None, status, meaning, action, "px")

@@ -12,21 +12,28 @@ from factorlab.cli.settings import Command
 if TYPE_CHECKING:
     from vision3d.boards import Board
 
-__all__ = ["BOARD_OPTIONS", "board_of"]
+__all__ = ["BOARD_OPTIONS", "board_of", "board_options"]
 
 KINDS = ("checkerboard", "charuco", "circles", "acircles", "markers")
 
-BOARD_OPTIONS: tuple[Callable[[Command], Command], ...] = (
-    click.option("--board", "board_text", metavar="COLSxROWS", required=True,
-                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles, markers."),
-    click.option("--square", metavar="LENGTH", required=True,
-                 help="Side of a square or of a marker, or distance of circles: 25mm, 2.5cm, 0.025m."),
-    click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
-                 help="What is on the board."),
-    click.option("--marker", metavar="LENGTH",
-                 help="Markers of a ChArUco board: 18mm, 0.75 squares by default; gap of markers."),
-    click.option("--dictionary", metavar="NAME", help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
-)  # fmt: skip
+
+def board_options(*, required: bool) -> tuple[Callable[[Command], Command], ...]:
+    """Options of the board; where they are not required, the command says itself what is missing."""
+    return (
+        click.option("--board", "board_text", metavar="COLSxROWS", required=required,
+                     help="Inner corners of a checkerboard (9x6), squares of ChArUco, circles, markers."),
+        click.option("--square", metavar="LENGTH", required=required,
+                     help="Side of a square or of a marker, or distance of circles: 25mm, 2.5cm, 0.025m."),
+        click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
+                     help="What is on the board."),
+        click.option("--marker", metavar="LENGTH",
+                     help="Markers of a ChArUco board: 18mm, 0.75 squares by default; gap of markers."),
+        click.option("--dictionary", metavar="NAME",
+                     help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
+    )  # fmt: skip
+
+
+BOARD_OPTIONS = board_options(required=True)
 
 
 def board_of(options: dict[str, Any]) -> Board:

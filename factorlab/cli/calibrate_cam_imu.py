@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factorlab.cli.board_options import board_of, board_options
 from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.recording import opened
 from factorlab.cli.settings import Command, as_json, check_option, command_line, config_option, with_options
@@ -20,22 +21,13 @@ if TYPE_CHECKING:
 __all__ = ["cam_imu"]
 
 FILE = click.Path(dir_okay=False, path_type=Path)
-KINDS = ("checkerboard", "charuco", "circles", "acircles", "markers")
 
 OPTIONS: tuple[Callable[[Command], Command], ...] = (
     click.argument("frames", metavar="FRAMES", required=False),
     click.argument("log", metavar="LOG", required=False),
     click.option("--camera", "camera_file", type=FILE, metavar="FILE",
                  help="The camera's calibration, in any format."),
-    click.option("--board", "board_text", metavar="COLSxROWS",
-                 help="Inner corners of a checkerboard (9x6), squares of a ChArUco board, circles, markers."),
-    click.option("--square", metavar="LENGTH",
-                 help="Side of a square or of a marker, or distance of circles: 25mm, 2.5cm, 0.025m."),
-    click.option("--kind", type=click.Choice(KINDS), default="checkerboard", show_default=True,
-                 help="What is on the board."),
-    click.option("--marker", metavar="LENGTH",
-                 help="Markers of a ChArUco board: 18mm, 0.75 squares by default; gap of markers."),
-    click.option("--dictionary", metavar="NAME", help="Of the markers: 4x4_50, 6x6_250 …  [default: 4x4_50]"),
+    *board_options(required=False),
     click.option("--stamps", type=FILE, metavar="FILE",
                  help="A stamp for every frame.  [default: frames.csv beside them, or their names]"),
     click.option("--fps", type=click.FloatRange(min=0.5), metavar="HZ",
@@ -169,7 +161,6 @@ def _settings(options: dict[str, Any]) -> Any:
 def _job(options: dict[str, Any]) -> CamImuJob:
     from factorlab.cam_imu import CamImuJob
     from factorlab.cam_imu.files import read_mounting
-    from factorlab.cli.board_options import board_of
     from vision3d.camera_files import read_camera
 
     noise = options["imu_noise"]

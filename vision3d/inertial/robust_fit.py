@@ -41,7 +41,12 @@ def fit(
     counted = np.where(problem.corner_weight[:, None] > 0.0, adjusted.linear.residuals_px, np.nan)
     if (floor := floor_of(counted, corners.sigma_px)) > 0.0:
         wider = replace(corners, sigma_px=np.hypot(corners.sigma_px, floor))
-        problem, adjusted = _with_noise(replace(problem, corners=wider), adjusted, walk)
+        # who is believed was decided by the sigmas as stated, and is decided anew
+        problem = replace(problem, corners=wider, corner_weight=np.ones(len(wider.frame)))
+        for _ in range(2):
+            adjusted = adjust(problem, adjusted.state, walk, iterations=12)
+            problem = _weighed(_scaled_by_medians(problem, adjusted), adjusted, trim=True)
+        problem, adjusted = _with_noise(problem, adjusted, walk)
     return problem, adjusted, walk
 
 
@@ -107,11 +112,20 @@ def _limits(problem: Problem) -> tuple[float, float]:
 
 
 def _rescaled(problem: Problem, adjusted: Adjusted) -> tuple[Array, Array, Array]:
-    """Distances once each group's median is that of a normal distribution."""
-    return tuple(
-        one / max(float(np.median(one)) / np.sqrt(chi2.median(k)), 1e-9)
-        for one, k in zip(_distances(adjusted, problem), (3, 3, 2), strict=True)
-    )
+    """Distances once each group's median is that of a normal distribution.
+
+    A corner is as far off as its own sigma or all corners' say, whichever is less: a detector may err.
+    """
+    gyro, accel, corner = _distances(adjusted, problem)
+    pixels = np.linalg.norm(adjusted.linear.residuals_px, axis=1)
+    own = [_unit_median(one, k) for one, k in ((gyro, 3), (accel, 3), (corner, 2), (pixels, 2))]
+    return own[0], own[1], np.minimum(own[2], own[3])
+
+
+def _unit_median(lengths: Array, numbers: int) -> Array:
+    """Lengths of so many numbers each, scaled so that their median is that of standard normal ones."""
+    scale = max(float(np.median(lengths) / np.sqrt(chi2.median(numbers))), 1e-9)
+    return np.asarray(lengths / scale)
 
 
 def _doubtful(problem: Problem, adjusted: Adjusted) -> bool:

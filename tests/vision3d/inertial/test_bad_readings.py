@@ -145,6 +145,16 @@ def test_corners_and_knocks_that_nothing_explains_are_left_out(world, rng):
     assert error @ np.linalg.solve(found.cov[:7, :7], error) < 35.0
 
 
+def test_corners_that_claim_too_little_or_too_much_are_weighed_by_their_residuals(world, rng):
+    corners = world.corners
+    claimed = np.where(rng.random(len(corners.frame)) < 0.5, 200.0, 1.0) * corners.sigma_px
+    found = world.changed(corners=replace(corners, sigma_px=claimed)).calibrated()
+    assert within(world, found)
+    assert found.frames_used.all()
+    sigma = found.problem.corner_scale * np.median(found.problem.corners.sigma_px)
+    assert 0.05 < sigma < 0.2
+
+
 def test_settings_are_checked():
     for wrong in ({"imu_model": "full"}, {"gravity": 1.0}, {"order": 3}, {"knots_per_s": 0.1}):
         with pytest.raises(ModelError):
