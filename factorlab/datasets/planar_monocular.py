@@ -92,7 +92,7 @@ def load_planar_monocular(
             landmarks={int(row[0]): row[1:4] for row in world},
             axes=2,
             graph_options={"initial": "incremental"},
-            default_estimators=("isam2", "isam2_final", "batch"),
+            default_estimators=("batch", "batch_robust"),
             notes=_notes(recording, left_out, pixel_noise, sigma),
         )
     ]
