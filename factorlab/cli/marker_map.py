@@ -31,7 +31,7 @@ OPTIONS = (
                  help="Times of the frames: a table with one row a frame, as `live` writes it."),
     click.option("--reference", type=int, metavar="ID",
                  help="With --map: marker at the origin.  [default: the one that most hang on]"),
-    click.option("--demo", is_flag=True, help="With --map: a simulated room, and its truth."),
+    click.option("--demo", is_flag=True, help="A map of a simulated room, camera and IMU."),
 )  # fmt: skip
 ONLY = ("imu", "extrinsics", "imu_noise", "time_offset", "stamps", "reference")
 OF_IMU = ("extrinsics", "imu_noise", "time_offset", "kind", "units", "columns", "rate")

@@ -1,4 +1,4 @@
-"""A room with markers that is simulated, solved, and held to its truth."""
+"""A room with markers that is simulated and solved."""
 
 from __future__ import annotations
 
