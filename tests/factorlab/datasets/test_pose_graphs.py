@@ -130,7 +130,7 @@ def test_a_file_of_ones_own(tmp_path):
     )
     dataset = load_graph_file(path)
     assert dataset.title == "mine: a graph file; 3 poses, 1 landmarks, 1 loop closures"
-    assert "CAM (1)" in dataset.notes[-1]
+    assert "CAM (1)" in dataset.notes[1]
     assert dataset.problem.start is None
     run = solved(dataset)
     assert len(run.values.rows["l"]) == 1
