@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.graph.slam.containers import Containers
-from factorlab.graph.slam.lowering import native_factors
+from factorlab.graph.slam.lowering import lowered, native_factors
 from factorlab.graph.slam.variables import SHIFT, keys_of, require_type
 from sequential.errors import ModelError, UnderConstrainedError
 from sequential.model import Loss
-from sequential.slam import SlamProblem
+from sequential.slam import Factors, SlamProblem
 from sequential.slam.beginnings import Able, in_order, who
 from sequential.slam.determined import Reading, Several, determined
 from sequential.slam.models import Between
@@ -46,6 +46,12 @@ class Step:
     replaced: list[int] = field(default_factory=list)  # numbers of factors that leave the engine
 
 
+def calm_factors(group: Factors, loss: Loss | None) -> list[Any] | None:
+    """Native factors that never raise, or None."""
+    native = lowered(group.model)
+    return None if native is None or native.raises else native_factors(group, loss)
+
+
 class Feed:
     """The measurements of a problem as factors, step by step.
 
@@ -68,7 +74,7 @@ class Feed:
     ) -> None:
         self.problem, self.believed, self.everything = problem, believed, everything
         self.threshold = threshold
-        self.factors = [native_factors(group, loss) for group in problem.factors]
+        self.factors = [calm_factors(group, loss) for group in problem.factors]
         loose = [g for g, made in enumerate(self.factors) if made is None]
         self.containers = Containers(problem, loose, loss) if loose else None
         self.keys = [

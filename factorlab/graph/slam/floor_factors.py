@@ -28,4 +28,4 @@ def _(model: PlanarProjection) -> NativeFactor | None:
     def factor(pose: int, point: int, pixel: Array, noise: Any) -> Any:
         return make(pose, point, pixel, mount, calibration, noise)
 
-    return NativeFactor(factor, list)
+    return NativeFactor(factor, list, raises=True)

@@ -38,11 +38,14 @@ class NativeFactor:
     make : `make(key, …, reading, noise)`, mostly GTSAM's class itself
     readings : measurements (N, size) as GTSAM wants them, one object each
     order : GTSAM's order of the components of the error, where it is not ours
+    raises : whether it raises where our model gives a large error, as for a point behind the camera; engines
+        that grow, whose points still move, then take our rows instead
     """
 
     make: Callable[..., Any]
     readings: Callable[[Array], list[Any]]
     order: tuple[int, ...] | None = None
+    raises: bool = False
 
 
 @singledispatch
