@@ -93,6 +93,9 @@ class Feed:
         self.dropped = 0
         self.waiting: list[Measurement] = []
         self.again: dict[int, int] = {}
+        # of poses that odometry alone has placed, since the first; only points that wait want to know
+        self.drift: dict[int, Array] = {}
+        self.drifts = any(len(g.slots) > 1 and not isinstance(g.model, Between) for g in problem.factors)
         self.newest: dict[int, Any] = {}  # what the engine was asked for last
 
     def _given(self) -> dict[int, Any]:
@@ -152,22 +155,16 @@ class Feed:
 
     def _add(self, step: Step, g: int, row: int) -> bool:
         """Add one measurement, with the variable that it begins; False where it has to wait."""
-        keys, known = self.keys[g][row], self.known
-        if not known.issuperset(keys):
-            missing = [k for k, key in enumerate(keys) if key not in known]
+        keys = self.keys[g][row]
+        if not self.known.issuperset(keys):
             if self.gone and not self.gone.isdisjoint(keys):
                 self.dropped += 1
                 return True
-            if self.begun:
-                for k in [k for k in missing if keys[k] in self.begun]:
-                    self._enter(step, keys[k], self.begun[keys[k]])
-                    missing.remove(k)
-            if len(missing) == 1 and self.able(g, missing[0]):
-                placed = self._place(step, g, row, missing[0], keys)
-                if placed is not None:
-                    self._enter(step, keys[missing.pop()], placed)
-            if missing:
+            if not self._begin(step, g, row, keys):
                 return False
+        if self.drift and self.chained[g] is None:
+            for key in keys:
+                self.drift.pop(key, None)
         made = self.factors[g]
         if made is None:
             step.loose.append((g, row))
@@ -175,6 +172,19 @@ class Feed:
             step.graph.push_back(made[row])
             step.names.append((g, row))
         return True
+
+    def _begin(self, step: Step, g: int, row: int, keys: tuple[int, ...]) -> bool:
+        """Begin what a measurement joins and is not there yet; whether all of it is there now."""
+        missing = [k for k, key in enumerate(keys) if key not in self.known]
+        if self.begun:
+            for k in [k for k in missing if keys[k] in self.begun]:
+                self._enter(step, keys[k], self.begun[keys[k]])
+                missing.remove(k)
+        if len(missing) == 1 and self.able(g, missing[0]):
+            placed = self._place(step, g, row, missing[0], keys)
+            if placed is not None:
+                self._enter(step, keys[missing.pop()], placed)
+        return not missing
 
     def _loosen(self, step: Step, *, look: bool) -> None:
         """Linearise what has no native factor: what is new, and what has moved."""
@@ -206,6 +216,10 @@ class Feed:
         chained = self.chained[g]
         if chained is not None and type(chained[row]) is not np.ndarray:
             other = self._now(step, keys[1 - missing])
+            if self.drifts:
+                noise = np.asarray(self.problem.factors[g].noise_cov)
+                own = noise[row] if noise.ndim == 3 else noise
+                self.drift[keys[missing]] = own + self.drift.get(keys[1 - missing], 0.0)
             return other.compose(chained[row] if missing == 1 else chained[row].inverse())
         group = self.problem.factors[g]
         values = [None if k == missing else self._row(step, key)[None] for k, key in enumerate(keys)]
@@ -248,8 +262,22 @@ class Feed:
                 None if k == slot else np.stack([self._row(step, self.keys[g][row][k]) for row in rows])
                 for k in range(len(group.slots))
             )
-            readings.append(Reading(group.model, slot, np.asarray(group.z)[rows], values, group.covs()[rows]))
+            drift = tuple(
+                None if k == slot else self._drifts([self.keys[g][row][k] for row in rows])
+                for k in range(len(group.slots))
+            )
+            z, cov = np.asarray(group.z)[rows], group.covs()[rows]
+            readings.append(Reading(group.model, slot, z, values, cov, drift))
         return readings
+
+    def _drifts(self, keys: list[int]) -> Array | None:
+        """How uncertain poses (N) are relative to the last of them: (N, d, d), or None."""
+        own = [self.drift.get(key) for key in keys]
+        d = next((len(cov) for cov in own if cov is not None), 0)
+        if not d or len(own) < 2:
+            return None
+        gathered = np.stack([np.zeros((d, d)) if cov is None else cov for cov in own])
+        return np.asarray(gathered[-1] - gathered)
 
     def _stranded(self, g: int, row: int) -> str:
         group = self.problem.factors[g]
