@@ -9,9 +9,12 @@ from factorlab.datasets.slam import SlamDataset
 from factorlab.slam.engine import SlamRow
 from factorlab.slam.estimators import KINDS
 from factorlab.slam.loops import loop_finding
+from sequential.errors import FactorlabError
 
 __all__ = ["bought", "findings_of"]
 
+LOOKS = 200  # about how often the claim of a filter is looked at
+HONEST_CLAIM = 1.05
 SAME_CHI2 = 1e-4  # relative: two solvers stand in the same minimum
 
 
@@ -25,6 +28,7 @@ def findings_of(dataset: SlamDataset, rows: tuple[SlamRow, ...]) -> tuple[Findin
     for row in closed[-1:]:
         told_loops = row.loops and loop_finding(dataset, row.title, row.name, row.loops)
         found += [told_loops] if told_loops else []
+    found += _claim(dataset, rows)
     if told := bought(rows):
         found.append(told)
     return tuple(sorted(found, key=lambda finding: ORDER[finding.status]))
@@ -86,6 +90,26 @@ def _remedy(row: SlamRow) -> str:
     return (
         "do not trust the covariance: noise that is correlated or too small, wrong matches, or a wrong model"
     )
+
+
+def _claim(dataset: SlamDataset, rows: tuple[SlamRow, ...]) -> list[Finding]:
+    """Why a filter is too sure: by how much it claims to see a turn of its whole world."""
+    row = next((row for row in rows if row.name == "ekf_slam" and row.scores and row.scores.honesty), None)
+    problem = dataset.problem
+    if row is None or dataset.axes != 2 or "l" not in problem.kinds:
+        return []
+    from sequential.slam.observability import claimed_heading
+
+    steps = len(problem.indices(problem.moving[0]))
+    try:
+        claim = claimed_heading(problem, every=max(1, steps // LOOKS))
+    except FactorlabError:
+        return []  # something measures the heading of this world: no claim can be too bold
+    honest = claim.lost < HONEST_CLAIM
+    action = "" if honest else "smooth, or EkfSlam(linearisation='first_estimates' or 'invariant')"
+    status: Status = "PASS" if honest else "WARN"
+    name = f"{row.title}: claim about the heading of the world"
+    return [Finding(name, claim.lost, None, status, str(claim), action, row.name)]
 
 
 def bought(rows: tuple[SlamRow, ...]) -> Finding | None:

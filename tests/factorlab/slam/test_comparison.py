@@ -53,6 +53,13 @@ def test_later_readings_help_and_the_batch_is_where_isam2_ends(compared):
     assert any(finding.metric == "what smoothing bought" for finding in compared[1].findings)
 
 
+def test_the_filter_is_told_what_it_claims_to_see(compared):
+    (told,) = (one for one in compared[1].findings if "heading of the world" in one.metric)
+    assert told.value > 1.05
+    assert told.status == "WARN"
+    assert "first_estimates" in told.action
+
+
 def test_json_and_terminal_tell_the_same(compared):
     plain = compared[1].to_json()
     assert set(plain["estimators"]) == set(ROWS)
