@@ -83,6 +83,7 @@ def load_victoria_park(
             ),
             graph_options={"initial": "incremental"},
             default_estimators=("ekf_slam", "isam2", "isam2_final", "fixed_lag", "batch", "batch_robust"),
+            isam_every=10,
         )
     ]
 
