@@ -45,10 +45,9 @@ def test_mit_has_a_worse_minimum_beside_the_odometry(data_dir):
         assert solved(dataset, initial=initial).report.details["chi2"] == pytest.approx(41.2069, rel=1e-5)
 
 
-@pytest.mark.parametrize("seed", [0, 2])
-def test_intel_with_false_loops(seed, data_dir):
+def test_intel_with_false_loops(data_dir):
     """30 % of the loop closures are false; their poses never met."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(2)
     (dataset,) = load_slam("intel", data=data_dir / "pose_graph")
     problem, loop = dataset.problem, group(dataset, "loop")
     pairs = np.sort(rng.integers(0, 1728, (400, 2)), axis=1)
