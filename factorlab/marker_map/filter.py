@@ -147,8 +147,9 @@ class _Filter:
                 continue
             camera = inverse(self.modes.poses[list(rows), 0])
             poses = compose(camera, inverse(self.rows.body_T_camera))
-            self.body, self.P = started(poses, segments, self.inertial)
-            return
+            if (begun := started(poses, segments, self.inertial)) is not None:
+                self.body, self.P = begun
+                return
 
     def take(self, seen: Ints) -> None:
         """Correct by known markers, and begin new ones."""

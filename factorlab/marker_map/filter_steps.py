@@ -35,6 +35,7 @@ __all__ = ["Body", "propagated", "started"]
 Array = NDArray[np.float64]
 TILT_SIGMA = 0.03  # rad: gravity from a second of motion, with a bias of the accelerometer
 SPEED_SIGMA = 0.15  # m/s
+GRAVITY_GAP, GYRO_GAP = 0.5, 0.2  # m/s² and rad/s: beyond these the poses of a start contradict the IMU
 GYRO_SIGMA = 0.02  # rad/s, of the bias that a second of turns tells
 KNOWN_RAD, KNOWN_M = 1e-3, 1e-5
 """Heading and place are zero by definition, but tilts of a degree move the heading to second order."""
@@ -55,7 +56,9 @@ class Body:
         return Body(pose, self.velocity + step[6:9], self.bias + step[9:15])
 
 
-def started(poses: Array, segments: Sequence[Segment | None], inertial: Inertial) -> tuple[Body, Array]:
+def started(
+    poses: Array, segments: Sequence[Segment | None], inertial: Inertial
+) -> tuple[Body, Array] | None:
     """Level by a second of motion beside one marker; heading and place of the last frame are the origin.
 
     Parameters
@@ -65,7 +68,8 @@ def started(poses: Array, segments: Sequence[Segment | None], inertial: Inertial
     Returns
     -------
     tuple
-        the body at the last of them, and its covariance (15, 15).
+        the body at the last of them, and its covariance (15, 15); None where gravity or the gyro's bias that
+        poses and IMU imply together are not to be believed.
 
     Raises
     ------
@@ -73,6 +77,9 @@ def started(poses: Array, segments: Sequence[Segment | None], inertial: Inertial
         where they share too little with the IMU.
     """
     first = start_inertial(poses, segments)
+    unlike = abs(float(np.linalg.norm(first.gravity)) - inertial.gravity) > GRAVITY_GAP
+    if unlike or float(np.linalg.norm(first.gyro_bias)) > GYRO_GAP:
+        return None  # some of the poses are the other reading of their corners, or too far away to tell
     level = compose(upright(first.gravity), poses[-1])
     attitude = rotation_matrix(level[:4])
     heading = quaternion_exp(np.array([0.0, 0.0, -np.arctan2(attitude[1, 0], attitude[0, 0])]))

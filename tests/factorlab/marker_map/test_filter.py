@@ -8,7 +8,7 @@ from factorlab.marker_map import Inertial
 from factorlab.marker_map.beside import beside
 from factorlab.marker_map.filter import filter_markers
 from factorlab.marker_map.filter_gauge import held_at
-from factorlab.marker_map.filter_steps import Body, propagated
+from factorlab.marker_map.filter_steps import Body, propagated, started
 from factorlab.marker_map.segments import cut_at_frames
 from factorlab.marker_map.world import BIAS_SIGMAS, NOISE
 from sequential.errors import DataError
@@ -50,6 +50,27 @@ def between(a, b):
     """(15,) step of the filter from body a to body b."""
     turn = quaternion_log(quaternion_multiply(quaternion_inverse(a.pose[:4]), b.pose[:4]))
     return np.concatenate([turn, b.pose[4:] - a.pose[4:], b.velocity - a.velocity, b.bias - a.bias])
+
+
+def test_no_start_from_poses_that_contradict_the_imu():
+    world, told, _ = recorded(0, 1.5)
+    inertial = Inertial(told.imu, world.body_T_camera, NOISE)
+    segments = cut_at_frames(told.imu, told.sightings.t)
+    truth = told.truth.poses
+    body, _ = started(truth, segments, inertial)
+    tilt = rotate(body.pose[:4], np.array([0.0, 0.0, 1.0])) - rotate(truth[-1, :4], np.array([0.0, 0.0, 1.0]))
+    assert abs(tilt[2]) < 0.05
+    flipped = truth.copy()
+    flipped[::2, :4] = quaternion_multiply(flipped[::2, :4], np.array([0.0, 1.0, 0.0, 0.0]))
+    assert started(flipped, segments, inertial) is None
+
+
+@pytest.mark.parametrize("seed", [5, 7])
+def test_rooms_with_few_sure_sightings_do_not_lead_astray(seed):
+    _, told, run = filtered(seed, 8.0, world={"flat": True}, sigma_px=0.3)
+    kept = np.isfinite(run.poses[:, 0]) & (run.frames > 45)
+    gap = run.poses[kept, 4:] - told.truth.poses[run.frames[kept], 4:]
+    assert np.sqrt(np.mean(np.sum(gap**2, axis=1))) < 0.1
 
 
 def test_the_covariance_is_carried_as_differences_say():
