@@ -157,7 +157,7 @@ def _names(given: str | None) -> tuple[str, ...] | None:
 
 def _datasets(settings: Settings) -> list[Dataset]:
     """The named dataset, or the user's own log."""
-    from factorlab.datasets import NAMES, load
+    from factorlab.datasets import NAMES, SLAM_NAMES, load
 
     if settings.source in NAMES:
         for option, given in (("--model", settings.model), ("--truth", settings.truth)):
@@ -169,7 +169,7 @@ def _datasets(settings: Settings) -> list[Dataset]:
         return load(settings.source, use_every=use_every, robot=settings.robot)
     from factorlab.compare.own import own_dataset, require_log
 
-    path = require_log(settings.source, NAMES)
+    path = require_log(settings.source, tuple(dict.fromkeys((*NAMES, *SLAM_NAMES))))
     if settings.robot is not None:
         raise click.UsageError("--robot goes with a dataset that has several")
     if settings.model is None:
