@@ -97,10 +97,8 @@ def _analysed(matrix: Any, dims: Ints) -> tuple[Ints, list[Front]]:
         dominant, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
     order = np.argsort(factor.perm_c).astype(np.int64)
-    lower = factor.L.tocsc()
-    lower.sort_indices()
     begin = np.concatenate([[0], np.cumsum(dims[order])]).astype(np.int64)
-    below = [lower.indices[lower.indptr[j] + 1 : lower.indptr[j + 1]] for j in range(count)]
+    below = _filled(joined[order][:, order].tocsc())
     fronts: list[Front] = []
     front_of = np.zeros(count, dtype=np.int64)
     start = 0
@@ -120,7 +118,28 @@ def _analysed(matrix: Any, dims: Ints) -> tuple[Ints, list[Front]]:
     return order, fronts
 
 
-def _goes_on(here: NDArray[np.int32], ahead: NDArray[np.int32], j: int) -> bool:
+def _filled(pattern: Any) -> list[Ints]:
+    """Rows below the diagonal of each column of the Cholesky factor, ascending.
+
+    A column has its own entries and those of its children in the elimination tree (Liu 1990, "The role of
+    elimination trees in sparse factorization").  The numbers of a factor cannot tell: along a chain of some
+    hundred variables its fill falls below the smallest number there is.
+    """
+    count = pattern.shape[0]
+    parts: list[list[Ints]] = [[] for _ in range(count)]
+    below: list[Ints] = []
+    for j in range(count):
+        own = pattern.indices[pattern.indptr[j] : pattern.indptr[j + 1]].astype(np.int64)
+        rows = np.unique(np.concatenate([own, *parts[j]]))
+        rows = rows[rows > j]
+        parts[j] = []
+        if len(rows):
+            parts[int(rows[0])].append(rows)
+        below.append(rows)
+    return below
+
+
+def _goes_on(here: Ints, ahead: Ints, j: int) -> bool:
     """Whether column j+1 has the pattern of column j without itself, so that one front serves both."""
     return len(here) == len(ahead) + 1 and here[0] == j + 1 and bool(np.array_equal(here[1:], ahead))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from graph_files import BOTH, looped
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from factorlab.graph.slam import BatchSlam
 from factorlab.graph.slam import marginals as room
@@ -38,6 +38,23 @@ def test_blocks_are_those_of_the_dense_inverse(rng):
             np.testing.assert_allclose(
                 block, inverse[part, part], rtol=1e-6, atol=1e-12 * inverse[part, part].max()
             )
+
+
+def test_a_long_chain_keeps_its_fill(rng):
+    """A chain of scalars that ends see the same few others: its fill is far smaller than any number."""
+    chain, others = 1500, 12
+    dims = np.ones(chain + others, dtype=np.int64)
+    pairs = [(k, k + 1) for k in range(chain - 1)]
+    pairs += [
+        (k, chain + int(j)) for k in (*range(30), *range(chain - 30, chain)) for j in rng.choice(others, 4)
+    ]
+    rows = np.repeat(np.arange(len(pairs)), 2)
+    values = rng.uniform(0.5, 2.0, len(pairs))[:, None] * [1.0, -1.0]
+    shape = (len(pairs), chain + others)
+    joined = csr_array((values.ravel(), (rows, np.array(pairs).ravel())), shape)
+    matrix = csr_array(vstack([joined, csr_array(([1.0], ([0], [0])), (1, shape[1]))]))
+    exact = np.diag(np.linalg.inv((matrix.T @ matrix).toarray()))
+    np.testing.assert_allclose(np.ravel(diagonal_blocks(matrix, dims)), exact, rtol=1e-7)
 
 
 @pytest.mark.parametrize("manifold", BOTH, ids=["plane", "space"])
