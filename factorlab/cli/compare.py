@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from factorlab.cli.faults import CHECK_FAILED, DATA_ERROR, in_one_sentence
+from factorlab.cli.comparing import exit_code, names_of, progress_of, say_why, show
+from factorlab.cli.faults import in_one_sentence
 from factorlab.cli.settings import (
     as_json,
     check_option,
@@ -17,16 +17,14 @@ from factorlab.cli.settings import (
     config_option,
     lags_of,
     max_gap_option,
-    print_json,
     robot_option,
     seed_option,
 )
 
 if TYPE_CHECKING:
-    from factorlab.compare import Comparison
     from factorlab.datasets import Dataset
 
-__all__ = ["Settings", "coloured", "compare", "compare_and_show"]
+__all__ = ["Settings", "compare", "compare_and_show"]
 
 FOLDER = click.Path(file_okay=True, path_type=Path)
 
@@ -110,15 +108,17 @@ def compare_and_show(settings: Settings) -> int:
     """Compare, write, print; returns the exit code."""
     from factorlab.compare import compare as run_comparison
     from factorlab.compare import document
+    from factorlab.compare.estimators import require_names
+    from factorlab.compare.text import terminal
     from factorlab.report.folder import require_free
 
-    names = _names(settings.estimators)
+    names = names_of(settings.estimators, require_names)
     if settings.out is not None:
         require_free(settings.out, force=settings.force)
     datasets = _datasets(settings)
     comparisons = []
     for dataset in datasets:
-        with _progress(dataset.name) as progress:
+        with progress_of(dataset.name) as progress:
             comparisons.append(
                 run_comparison(
                     dataset,
@@ -132,27 +132,15 @@ def compare_and_show(settings: Settings) -> int:
             )
     done = tuple(comparisons)
     if all(comparison.all_failed for comparison in done):
-        return _say_why(done)
+        return say_why(done)
     whole = document(done, command_line())
-    _print(done, whole, as_json=settings.as_json)
+    show(done, whole, terminal, as_json=settings.as_json)
     if settings.out is not None:
         from factorlab.report import write_report
 
         page = write_report(done, whole, settings.out, force=settings.force)
         click.echo(f"report: {page}", err=settings.as_json)
-    return _exit_code(done, check=settings.check)
-
-
-def _names(given: str | None) -> tuple[str, ...] | None:
-    """Names of estimators; a wrong one is a usage error."""
-    if given is None:
-        return None
-    from factorlab.compare.estimators import UnknownEstimatorError, require_names
-
-    try:
-        return require_names(tuple(name.strip() for name in given.split(",") if name.strip()))
-    except UnknownEstimatorError as error:
-        raise click.BadParameter(str(error), param_hint="--estimators") from error
+    return exit_code(done, check=settings.check)
 
 
 def _datasets(settings: Settings) -> list[Dataset]:
@@ -177,43 +165,3 @@ def _datasets(settings: Settings) -> list[Dataset]:
             f"a log of your own needs a model: factorlab compare {path} --model FILE.py:NAME"
         )
     return [own_dataset(path, settings.model, settings.truth, settings.use_every or 1)]
-
-
-def _progress(name: str) -> Any:
-    from factorlab.cli.progress import bar
-
-    return bar(name, shown=sys.stderr.isatty())
-
-
-def _print(comparisons: tuple[Comparison, ...], whole: dict[str, Any], *, as_json: bool) -> None:
-    if as_json:
-        print_json(whole)
-        return
-    from factorlab.compare.text import terminal
-
-    for comparison in comparisons:
-        for line in terminal(comparison):
-            click.echo(coloured(line))
-        click.echo()
-
-
-def coloured(line: str) -> str:
-    """A line with its status in colour, unless NO_COLOR is set."""
-    colours = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
-    import os
-
-    if line[:4] in colours and "NO_COLOR" not in os.environ:
-        return click.style(line[:4], fg=colours[line[:4]], bold=True) + line[4:]
-    return line
-
-
-def _say_why(comparisons: tuple[Comparison, ...]) -> int:
-    """No estimator succeeded: the reasons in one sentence."""
-    reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)
-    click.echo(f"error: no estimator succeeded: {'; '.join(reasons)}", err=True)
-    return DATA_ERROR
-
-
-def _exit_code(comparisons: tuple[Comparison, ...], *, check: bool) -> int:
-    failed = any(finding.status == "FAIL" for comparison in comparisons for finding in comparison.findings)
-    return CHECK_FAILED if check and failed else 0

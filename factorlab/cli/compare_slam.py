@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from factorlab.cli.faults import CHECK_FAILED, DATA_ERROR
-from factorlab.cli.settings import command_line, lags_of, print_json
+from factorlab.cli.comparing import exit_code, names_of, progress_of, say_why, show
+from factorlab.cli.settings import command_line, lags_of
 
 if TYPE_CHECKING:
     from factorlab.cli.compare import Settings
     from factorlab.datasets import SlamDataset
-    from factorlab.slam import SlamComparison
 
 __all__ = ["compare_slam_and_show", "is_slam"]
 
@@ -35,8 +33,10 @@ def compare_slam_and_show(settings: Settings) -> int:
     from factorlab.compare.table import document
     from factorlab.report.folder import require_free
     from factorlab.slam import compare_slam
+    from factorlab.slam.estimators import require_names
+    from factorlab.slam.text import terminal
 
-    names, lags = _names(settings.estimators), lags_of(settings.lags)
+    names, lags = names_of(settings.estimators, require_names), lags_of(settings.lags)
     if settings.tune:
         raise click.UsageError("--tune fits the noise of a chain; a SLAM problem keeps the noise it states")
     for name in CHAIN_ONLY:
@@ -47,35 +47,19 @@ def compare_slam_and_show(settings: Settings) -> int:
         require_free(settings.out, force=settings.force)
     done = []
     for dataset in _datasets(settings):
-        with _progress(dataset.name) as progress:
+        with progress_of(dataset.name) as progress:
             done.append(compare_slam(dataset, names, seed=settings.seed, lags=lags, progress=progress))
     comparisons = tuple(done)
     if all(comparison.all_failed for comparison in comparisons):
-        reasons = dict.fromkeys(row.message for comparison in comparisons for row in comparison.rows)
-        click.echo(f"error: no estimator succeeded: {'; '.join(reasons)}", err=True)
-        return DATA_ERROR
+        return say_why(comparisons)
     whole = document(comparisons, command_line())
-    _print(comparisons, whole, as_json=settings.as_json)
+    show(comparisons, whole, terminal, as_json=settings.as_json)
     if settings.out is not None:
         from factorlab.report.slam_writing import write_slam_report
 
         page = write_slam_report(comparisons, whole, settings.out, force=settings.force)
         click.echo(f"report: {page}", err=settings.as_json)
-    failed = any(finding.status == "FAIL" for one in comparisons for finding in one.findings)
-    return CHECK_FAILED if settings.check and failed else 0
-
-
-def _names(given: str | None) -> tuple[str, ...] | None:
-    """Names of estimators; a wrong one is a usage error."""
-    if given is None:
-        return None
-    from factorlab.compare.estimators import UnknownEstimatorError
-    from factorlab.slam.estimators import require_names
-
-    try:
-        return require_names(tuple(name.strip() for name in given.split(",") if name.strip()))
-    except UnknownEstimatorError as error:
-        raise click.BadParameter(str(error), param_hint="--estimators") from error
+    return exit_code(comparisons, check=settings.check)
 
 
 def _datasets(settings: Settings) -> list[SlamDataset]:
@@ -95,22 +79,3 @@ def _datasets(settings: Settings) -> list[SlamDataset]:
         f"{settings.source} is no SLAM problem; there are {', '.join(SLAM_NAMES)}, and graph files "
         f"of your own ({', '.join(sorted(GRAPH_FILES))})"
     )
-
-
-def _progress(name: str) -> Any:
-    from factorlab.cli.progress import bar
-
-    return bar(name, shown=sys.stderr.isatty())
-
-
-def _print(comparisons: tuple[SlamComparison, ...], whole: dict[str, Any], *, as_json: bool) -> None:
-    if as_json:
-        print_json(whole)
-        return
-    from factorlab.cli.compare import coloured
-    from factorlab.slam.text import terminal
-
-    for comparison in comparisons:
-        for line in terminal(comparison):
-            click.echo(coloured(line))
-        click.echo()

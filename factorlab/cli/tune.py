@@ -245,7 +245,7 @@ def _log(settings: Settings) -> SensorLog:
 
 
 def _print(done: tuple[Fitted, ...]) -> None:
-    from factorlab.cli.compare import coloured
+    from factorlab.cli.comparing import coloured
     from factorlab.tuning import fitted_lines
 
     for one in done:

@@ -49,16 +49,18 @@ class UnknownEstimatorError(ModelError):
     """A name that no estimator has."""
 
 
-def require_names(names: tuple[str, ...]) -> tuple[str, ...]:
-    """The names, once each; `UnknownEstimatorError` for one that no estimator has."""
+def require_names(
+    names: tuple[str, ...], known: tuple[str, ...] = EVERY_NAME, what: str = "estimator"
+) -> tuple[str, ...]:
+    """The names, once each; `UnknownEstimatorError` for one that is not `known`."""
     for name in names:
-        if name not in KINDS:
-            near = get_close_matches(name, EVERY_NAME, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(EVERY_NAME)}"
-            msg = f"no estimator is called {name!r}; {hint}"
+        if name not in known:
+            near = get_close_matches(name, known, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            msg = f"no {what} is called {name!r}; {hint}"
             raise UnknownEstimatorError(msg)
     if not names:
-        msg = f"a comparison needs an estimator; there are {', '.join(EVERY_NAME)}"
+        msg = f"a comparison needs an estimator; there are {', '.join(known)}"
         raise UnknownEstimatorError(msg)
     return tuple(dict.fromkeys(names))
 

@@ -160,19 +160,24 @@ def verdict_lines(findings: tuple[Finding, ...]) -> Iterable[str]:
         yield ""
 
 
-def _table(comparison: Comparison, rows: tuple[Row, ...], title: str) -> Iterable[str]:
-    body = [cells(row) for row in rows if not row.failed]
-    whole = [*zip(*headings(comparison), strict=True), *body]
-    lines = [tuple(cell for k, cell in enumerate(line) if k not in PAGE_ONLY) for line in whole]
+def aligned(lines: list[tuple[str, ...]]) -> Iterable[str]:
+    """Lines of cells as columns: the first stands left, the others right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    if title:
-        yield f"{title}:"
     for line in lines:
         first, *rest = (
             cell.ljust(w) if k == 0 else cell.rjust(w)
             for k, (cell, w) in enumerate(zip(line, widths, strict=True))
         )
         yield "  ".join((first, *rest)).rstrip()
+
+
+def _table(comparison: Comparison, rows: tuple[Row, ...], title: str) -> Iterable[str]:
+    body = [cells(row) for row in rows if not row.failed]
+    whole = [*zip(*headings(comparison), strict=True), *body]
+    lines = [tuple(cell for k, cell in enumerate(line) if k not in PAGE_ONLY) for line in whole]
+    if title:
+        yield f"{title}:"
+    yield from aligned(lines)
     for row in rows:
         if row.failed or row.message:
             yield f"{row.title}: {row.message}"

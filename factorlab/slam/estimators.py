@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Any, Literal, NamedTuple, Protocol
 
-from factorlab.compare.estimators import UnknownEstimatorError
+from factorlab.compare.estimators import require_names as known_names
 from sequential.slam import SlamProblem, SlamRun
 
 __all__ = ["KINDS", "NAMES", "Kind", "SlamEstimator", "make", "require_names"]
@@ -54,16 +53,7 @@ def require_names(names: tuple[str, ...]) -> tuple[str, ...]:
     UnknownEstimatorError
         for a name that no estimator of SLAM problems has.
     """
-    for name in names:
-        if name not in KINDS:
-            near = get_close_matches(name, NAMES, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(NAMES)}"
-            msg = f"no estimator of SLAM problems is called {name!r}; {hint}"
-            raise UnknownEstimatorError(msg)
-    if not names:
-        msg = f"a comparison needs an estimator; there are {', '.join(NAMES)}"
-        raise UnknownEstimatorError(msg)
-    return tuple(dict.fromkeys(names))
+    return known_names(names, NAMES, "estimator of SLAM problems")
 
 
 def make(

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from math import degrees
 from textwrap import wrap
 
-from factorlab.compare.text import NOTHING, WIDTH, band, figure, verdict_lines
+from factorlab.compare.text import NOTHING, WIDTH, aligned, band, figure, verdict_lines
 from factorlab.slam.engine import SlamComparison, SlamRow
 from factorlab.slam.estimators import KINDS
 
@@ -96,13 +96,7 @@ def terminal(comparison: SlamComparison) -> Iterable[str]:
         tuple(f"{name} {unit}".strip() if unit else name for name, unit in headings(comparison)),
         *(cells(row) for row in comparison.rows if not row.failed),
     ]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    for line in lines:
-        first, *rest = (
-            cell.ljust(w) if k == 0 else cell.rjust(w)
-            for k, (cell, w) in enumerate(zip(line, widths, strict=True))
-        )
-        yield "  ".join((first, *rest)).rstrip()
+    yield from aligned(lines)
     for row in comparison.rows:
         if row.failed or row.message:
             yield from wrap(f"{row.title}: {row.message}", WIDTH)
