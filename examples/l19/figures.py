@@ -42,11 +42,22 @@ def panels(rows=1, columns=1, *, size=(8.0, 4.0), title="", **grid):
     return figure, list(figure.subplots(rows, columns, squeeze=False, **grid).ravel())
 
 
-def save(figure, name):
-    """Write NAME.png into the folder that `-o` names, build/l19 unless given."""
+def out_folder():
+    """The folder that `-o` names, build/l19 unless given; made when it is missing."""
     parser = argparse.ArgumentParser(description=sys.modules["__main__"].__doc__)
     parser.add_argument("-o", "--out", type=Path, default=Path("build/l19"), help="dossier des figures")
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / f"{name}.png", dpi=110)
-    print(f"figure : {folder / f'{name}.png'}")
+    return folder
+
+
+def script_name():
+    """The name of the script that runs, without .py: figures and claims are filed under it."""
+    return Path(sys.modules["__main__"].__file__).stem
+
+
+def save(figure, part=""):
+    """Write the figure as SCRIPT.png, or SCRIPT_PART.png, into the folder that `-o` names."""
+    path = out_folder() / f"{script_name()}{'_' if part else ''}{part}.png"
+    figure.savefig(path, dpi=110)
+    print(f"figure : {path}")

@@ -15,6 +15,7 @@ from factorlab.cli.demo import demo
 from factorlab.cli.doctor import doctor
 from factorlab.cli.firmware import firmware
 from factorlab.cli.info import info
+from factorlab.cli.l19 import l19
 from factorlab.cli.line import line
 from factorlab.cli.live import live
 from factorlab.cli.markers import markers
@@ -74,6 +75,7 @@ for command in (
     objects,
     sfm,
     cloud,
+    l19,
     sheet,
     info,
     doctor,

@@ -19,17 +19,17 @@ def load(name):
 
 @pytest.fixture(scope="module")
 def e1():
-    return load("e1_kalman")
+    return load("31_e1_kalman")
 
 
 @pytest.fixture(scope="module")
 def e2():
-    return load("e2_median_et_sauts")
+    return load("32_e2_median_et_sauts")
 
 
 @pytest.fixture(scope="module")
 def d3():
-    return load("d3_demontrer_et_ukf")
+    return load("53_d3_demontrer_et_ukf")
 
 
 def textbook(F, B, H, Q, R, x, P, mesures, commandes):
@@ -119,7 +119,7 @@ def test_angles_are_averaged_on_the_circle(d3):
 
 @pytest.fixture(scope="module")
 def e4():
-    return load("e4_composantes")
+    return load("34_e4_composantes")
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 30), (30, 1), (25, 40)])

@@ -14,7 +14,7 @@ from sequential.sensors import ImuRecording
 from vision3d.camera_files import write_camera
 from vision3d.render import Plane, marker_texture, render_planes, write_video
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "l19" / "tp5_vision_imu.py"
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "l19" / "49_tp5_vision_imu.py"
 ASKEW = quaternion_exp(np.radians([5.0, -7.0, 3.0]))
 
 
@@ -36,7 +36,7 @@ def test_files_of_one_s_own(tmp_path, rng):
         capture_output=True, text=True, timeout=200, check=False,
     )  # fmt: skip
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
-    assert (tmp_path / "out" / "tp5_vision_imu.png").is_file()
+    assert (tmp_path / "out" / "49_tp5_vision_imu.png").is_file()
     found = done.stdout.split("biais trouvé [")[1].split("]")[0]
     bias = np.degrees(truth.gyro_bias[-1])
     np.testing.assert_allclose(np.array(found.split(), dtype=float), bias, atol=0.6)

@@ -124,7 +124,7 @@ def main():
     droite.plot(*suivi.T, ".-", color=BLUE, label="plus gros objet, 100 px au moins")
     droite.set(xlabel="x (px)", ylabel="y (px)", title="60 images", xlim=(0, 160), ylim=(120, 0))
     droite.legend(loc="lower left")
-    save(figure, "e4_composantes")
+    save(figure)
 
     net = find_blobs(image, orange, least_area=100)
     assert len(net) == 1, "après ouverture et fermeture, il ne reste que la balle"

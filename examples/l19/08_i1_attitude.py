@@ -101,7 +101,7 @@ def main():
         show("essai réel de BROAD :", real)
         draw_bars(axes[2], {"BROAD 05": real})
         axes[2].set(title="Essai réel de BROAD (déjà étalonné)")
-    save(figure, "i1_attitude")
+    save(figure)
 
     assert all(after[name][0] < 0.1 * before[name][0] for name in FILTERS), "l'étalonnage est obligatoire"
     assert all(after[name][0] < 1.5 for name in FILTERS), "et suffit ici à tous les filtres"

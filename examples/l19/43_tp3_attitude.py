@@ -103,7 +103,7 @@ def main():
     draw_q(a, declare, log, q)
     draw_knock(b, knocked, truth, paths)
     draw_bars(c, rms)
-    save(figure, "tp3_attitude")
+    save(figure)
 
     complementary, plain, gated = rms.values()
     found = np.degrees(kalman.estimate(quiet).gyro_bias[-1, :2])

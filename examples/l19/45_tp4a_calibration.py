@@ -60,7 +60,7 @@ def main():
     draw_straight(axes[1], *images[0], good)
     draw_uncertainty(axes[2], good, "vingt images : écart-type d'une projection (px)")
     draw_uncertainty(axes[3], poor, "quatre images presque de face : écart-type (px)")
-    save(figure, "tp4a_calibration")
+    save(figure)
 
     error = np.abs(good.camera.intrinsics - TRUE.intrinsics)
     assert (error < 4 * good.std[:4]).all(), "l'erreur est de l'ordre de l'écart-type annoncé"

@@ -109,7 +109,7 @@ def main():
     b.set(title="NIS moyen jusqu'à l'instant t", xlabel="temps (s)", ylabel="NIS (sans unité)")
     a.legend()
     b.legend()
-    save(figure, "e1_kalman")
+    save(figure)
 
     kf, x, P = Kalman(F, None, H, Q, R, x0, P0), x0, P0
     for measured in z[:100]:

@@ -186,7 +186,7 @@ def main():
     dessiner_photo(axes[7], photo(), adaptatif)
     for k in (0, 1, 2, 4, 5, 6, 7):
         axes[k].axis("off")
-    save(figure, "v1_image_matrice")
+    save(figure)
 
     assert egales, "NumPy, la boucle compilée et OpenCV donnent les mêmes pixels"
     assert abs(mesure / prevu - 1) < 0.15, "le flou ôte au bruit ce que disent ses poids"

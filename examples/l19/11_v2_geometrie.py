@@ -178,7 +178,7 @@ def dessiner(image, coins, droites, deux_boules, largeurs, vue, mesures):
     axes[5].legend()
     for ax in (axes[0], axes[1], axes[3]):
         ax.axis("off")
-    save(figure, "v2_geometrie")
+    save(figure)
 
 
 def main():

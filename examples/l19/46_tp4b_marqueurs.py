@@ -90,7 +90,7 @@ def main():
     draw_marker(axes[0], image, pose)
     draw_errors(axes[1], t, usual, followed)
     draw_odds(axes[2], t, odds_alone, odds)
-    save(figure, "tp4b_marqueurs")
+    save(figure)
 
     wrong = (followed > 12.0) & (odds > 20.0)
     assert flips > 0.1, "la meilleure reprojection saute d'une lecture à l'autre"

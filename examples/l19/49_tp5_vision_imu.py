@@ -151,7 +151,7 @@ def main():
             "caméra seule": off(recording.marker.context[1:, :4], marker_of(smoothed)[smoothed.index(seen)])
         }
         draw_errors(axes[1], {"caméra seule": (seen, None)}, gaps, "Écart au lisseur")
-        save(figure, "tp5_vision_imu")
+        save(figure)
         return
     errors = {name: off(q, recording.truth(t)) for name, (t, q) in curves.items()}
     rmse = {name: np.degrees(np.sqrt(np.mean(np.sum(e**2, axis=1)))) for name, e in errors.items()}
@@ -162,7 +162,7 @@ def main():
     print(f"lectures retournées {100 * flipped:.0f} % ; NEES (3 attendu) : "
           + ", ".join(f"{name} {value:.1f}" for name, value in found.items()))  # fmt: skip
     draw_errors(axes[1], curves, errors)
-    save(figure, "tp5_vision_imu")
+    save(figure)
 
     camera, gyro, fused, both = rmse.values()
     assert fused < 0.5 * min(camera, gyro), "la fusion est meilleure que chacun des deux"

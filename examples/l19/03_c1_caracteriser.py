@@ -164,7 +164,7 @@ def main():
         panel.legend(fontsize=8)
     axes[-1].axis("off")
     axes[-1].text(0.0, 0.9, "Ce que le filtre en reçoit\n\n" + "\n\n".join(told), va="top", fontsize=11)
-    figures.save(figure, "c1_caracteriser")
+    figures.save(figure)
 
 
 if __name__ == "__main__":

@@ -75,7 +75,7 @@ def main():
                label="± 5 σ, MAD globale" if sign > 0 else None)  # fmt: skip
     a.set(xlabel="temps (s)", ylabel="signal", ylim=(-6, 9.5))
     a.legend(ncols=2, loc="upper left")
-    save(figure, "e2_median_et_sauts")
+    save(figure)
 
     assert np.isin(jumps, found).all(), "tous les sauts sont trouvés"
     assert len(np.setdiff1d(found, jumps)) <= 4, "presque aucun de trop"

@@ -1,6 +1,6 @@
 """TP3, suite. Le filtre sur la carte, virgule fixe sur un AVR, flottant sur un Cortex-M4 : latence et gigue.
 
-Le Kalman (angle + biais) de `tp3_attitude.py` tourne ici en C, dans l'image même qui se flashe, sur des
+Le Kalman (angle + biais) de `43_tp3_attitude.py` tourne ici en C, dans l'image même qui se flashe, sur des
 cartes émulées : un ATmega328P dans simavr, compté au cycle, et un Cortex-M4F dans QEMU, qui compte des
 instructions.  Les échantillons arrivent par le bus I²C simulé d'un MPU-6050 ; l'angle sort cent fois par
 seconde sur la liaison série.
@@ -94,7 +94,7 @@ def main():
     draw_apart(a, recording.seconds, apart)
     draw_jitter(b, boards.get(AVR))
     draw_budget(c, {name: boards[name][0] for name in (AVR, SLOW) if name in boards})
-    save(figure, "tp3_portage")
+    save(figure)
     check(apart, boards)
 
 

@@ -89,7 +89,7 @@ def main():
     c.set(title="Court terme de l'un, long terme de l'autre", xlabel="temps (s)", ylabel="inclinaison (°)")
     c.set_ylim(-32, 75)
     c.legend(loc="upper left", ncols=2)
-    save(figure, "f1_capteur_reel")
+    save(figure)
 
     assert 0.6 < within < 0.75, "environ 68 % des mesures à moins d'un σ"
     assert abs(position[-1] - 0.5 * bias * 60**2) < 5.0, "le biais intégré deux fois donne ½bt²"

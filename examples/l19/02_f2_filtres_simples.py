@@ -79,7 +79,7 @@ def main():
     c.set(title="Complémentaire : cap qui franchit ±180°", xlabel="temps (s)", ylabel="erreur de cap (°)")
     c.set_ylim(-200, 260)
     c.legend(loc="upper left")
-    save(figure, "f2_filtres_simples")
+    save(figure)
 
     mean, median = FILTERS["moyenne (25)"], FILTERS["médiane (25)"]
     assert median.response().noise_gain > 1.2 * mean.response().noise_gain, "la médiane laisse plus de bruit"

@@ -72,7 +72,7 @@ def main():
         xlim=(-3, 200),
     )
     b.legend()
-    save(figure, "k1_kalman_1d")
+    save(figure)
 
     good = estimates[1.0]
     np.testing.assert_allclose(run.mean[:, 0], good[0], rtol=1e-10)

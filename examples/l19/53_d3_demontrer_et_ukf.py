@@ -157,7 +157,7 @@ def main():
     c.set(title=f"{RUNS} essais sous fort bruit", xlabel="pire erreur des 10 dernières secondes (m)",
           ylabel="part des essais (%)")  # fmt: skip
     c.legend(loc="lower right")
-    save(figure, "d3_demontrer_et_ukf")
+    save(figure)
 
     assert (excess > 0).all(), "aucun autre gain ne fait mieux"
     np.testing.assert_allclose(excess, expected, rtol=1e-6)

@@ -85,7 +85,7 @@ def main():
     droite.axvspan(debut, fin, color="#d6ebe3", zorder=0, label="plage utile")
     droite.set(xlabel="distance (cm)", ylabel="écart-type de d (cm)", title="σ croît comme d²", yscale="log")
     droite.legend(loc="upper left")
-    save(figure, "e3_capteur_ir")
+    save(figure)
 
     assert repli in {7.0, 8.0}, "la branche repliée est reconnue"
     assert np.all(np.abs(distance(courbe.reading(places), courbe) - places) < 1e-9), "l'inverse est exacte"

@@ -63,7 +63,7 @@ def main():
     b.semilogx(ratio, np.sqrt(1 - 1 / (1 + ratio**2)), color=GREEN, label="σ / σ0 après la mesure")
     b.set(title="Bonne mesure : K → 1 ; mauvaise : K → 0", xlabel="r / σ0", ylabel="sans unité")
     b.legend()
-    save(figure, "c2_bayes_1d")
+    save(figure)
 
     assert np.isclose(grid_mean, after, atol=1e-6), "la formule est la règle de Bayes"
     assert np.isclose(grid_sigma, sigma, atol=1e-6)

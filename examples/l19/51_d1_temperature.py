@@ -113,7 +113,7 @@ def main():
     c.plot(q, 1.0, "o", color=ORANGE, label=f"q choisi : {q:.1g} °C²/s³")
     c.set(title="Choisir Q par le NIS", xlabel="densité q (°C²/s³)", ylabel="NIS (sans unité)")
     c.legend()
-    save(figure, "d1_temperature")
+    save(figure)
 
     assert 0.35 < np.sqrt(R) < 0.65, "R mesuré sur 30 s de palier : à 13 % près en moyenne"
     assert abs(mean_nis(z, q, R) - 1.0) < 0.05, "Q réglé"

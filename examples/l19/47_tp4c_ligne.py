@@ -126,7 +126,7 @@ def main():
         ax.axis("off")
     axes[2].plot([bottom, middle], [BOTTOM - 3, MIDDLE], "o-", color="#D55E00")
     draw_path(axes[5], path)
-    save(figure, "tp4c_ligne")
+    save(figure)
 
     assert single.mean() > 0.25, "un seul seuil échoue dans l'ombre"
     assert abs(offset - reading.offset) < 0.05, "à la main ou suivie, la ligne est la même"

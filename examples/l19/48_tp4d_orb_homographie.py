@@ -111,7 +111,7 @@ def main():
             f"Après le test du rapport, RANSAC en garde {fit.count} sur {len(a)}")  # fmt: skip
     if rangs == 3:
         boite(axes[2])
-    save(figure, "tp4d_orb_homographie")
+    save(figure)
 
     assert justes((a, b)).mean() > justes(tous).mean() + 0.15, "le test du rapport écarte surtout des faux"
     assert (justes((a, b)) == fit.inliers).mean() > 0.95, "RANSAC retrouve lesquels sont justes"

@@ -1,7 +1,7 @@
 """TP1. Acquisition : un MPU-6050 ou un téléphone, immobile puis en mouvement, à 100 Hz.
 
-`python examples/l19/tp1_acquisition.py MON_FICHIER.csv` lit votre enregistrement (colonnes t, ax, ay, az, gx,
-gy, gz ; l'export d'un téléphone convient aussi) et répond au TP : la partie immobile, trouvée toute seule ;
+`python examples/l19/41_tp1_acquisition.py MON_FICHIER.csv` lit votre enregistrement (colonnes t, ax, ay, az,
+gx, gy, gz ; l'export d'un téléphone convient aussi) et répond au TP : la partie immobile, trouvée seule ;
 σ par axe ; biais du gyromètre ; variance d'Allan.  Faut-il 10 minutes immobiles ?  Le bruit blanc (pente
 -1/2) se lit en quelques secondes ; le plateau demande que la durée dépasse plusieurs fois le temps où la
 courbe se couche.  Quand il ne se voit pas, on donne une borne, pas une valeur.
@@ -110,7 +110,7 @@ def main():
     draw_allan(accel, noise, "accel", 1.0, "m/s²")
     for panel in (raw, turned, gyro, accel):
         panel.legend(loc="best")
-    save(figure, "tp1_acquisition")
+    save(figure)
 
     found = np.degrees([fit.N.value for fit in noise.fits["gyro"]])
     if origin == "simulé":

@@ -91,7 +91,7 @@ def main():
     b.axhline(0.0, color="black", linewidth=0.8)
     b.set(title="étalonné (autre échelle !)", xlabel="position", ylabel="m/s²")
     b.legend()
-    save(figure, "tp2_calibration_accelerometre")
+    save(figure)
 
     np.testing.assert_allclose(np.diag(library.matrix), gain, atol=1e-3)
     np.testing.assert_allclose(library.offset, offset, atol=5e-3)

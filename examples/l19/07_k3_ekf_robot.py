@@ -82,7 +82,7 @@ def main():
     a.legend(fontsize=8, loc="upper left")
     b.set(title="Innovation de la boussole", xlabel="temps (s)", ylabel="innovation (°)", ylim=(-400, 520))
     b.legend(loc="upper left")
-    save(figure, "k3_ekf_robot")
+    save(figure)
 
     good, bad, ukf, particles = rms
     assert rms[good] < 0.8, "l'EKF suit le robot"

@@ -86,7 +86,7 @@ def main():
     figure, (a, b) = panels(1, 2, size=(11.5, 4.2), title="K2. R au repos, Q par le NIS, puis un portillon")
     draw_nis(a, grid, curve, q, q_true)
     draw_gate(b, log, truth, gated, fixed)
-    save(figure, "k2_regler_q_et_r")
+    save(figure)
 
     assert abs(np.sqrt(R) / sigma_true - 1) < 0.15, "R mesuré au repos"
     assert 0.4 < q / q_true < 2.5, "Q par le NIS"

@@ -128,7 +128,7 @@ def main():
     axes[5].set(title=f"couleur seule : IoU {iou['brut']:.2f}".replace(".", ","))
     for ax in axes[4:]:
         ax.axis("off")
-    save(figure, "c3_pretraitement")
+    save(figure)
 
     assert vert > rouge + 30, "la moyenne des canaux les confondrait"
     assert notes["Harris, floue"][0] > 0.9, "presque tous les coins, sans égaliser"

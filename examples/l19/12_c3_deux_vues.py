@@ -157,7 +157,7 @@ def main():
     axes[3].plot(vraie, profondeur, ".", color=BLUE, markersize=3)
     axes[3].set(title=f"Profondeur triangulée : {100 * erreur:.2f} % d'erreur médiane".replace(".", ","),
                 xlabel="vraie, m", ylabel="triangulée, m", xlim=(0.6, 2.4), ylim=(0.6, 2.4))  # fmt: skip
-    save(figure, "c3_deux_vues")
+    save(figure)
 
     assert comptes["sift"][-1] > 5 * max(comptes["harris"][-1], comptes["fast"][-1]), (
         "une seule taille ne suit pas"

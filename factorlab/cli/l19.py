@@ -1,0 +1,10 @@
+"""`factorlab l19`: the course; one file a command beside this one, words in French for its students."""
+
+import click
+
+__all__ = ["l19"]
+
+
+@click.group(short_help="The course L19, « Perception » (in French).")
+def l19() -> None:
+    """Le cours L19, « Perception » : exercices, défis, robot suiveur de ligne, compte rendu."""
