@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from factorlab.live.camera.channel import Newest
+from factorlab.live.channel import Newest
 from vision3d.frames import Frame, FrameSource, open_frames
 
 __all__ = ["Captured", "FrameReader"]

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from factorlab.live.camera.channel import Newest
 from factorlab.live.camera.drawing import drawn
 from factorlab.live.camera.rates import Rates
 from factorlab.live.camera.reader import Captured, FrameReader
 from factorlab.live.camera.reading import Reading
 from factorlab.live.camera.recording import Recorded, Recording
 from factorlab.live.camera.task import Task
+from factorlab.live.channel import Newest
 from sequential.errors import DataError, FactorlabError
 from vision3d.frames import FrameSource
 

@@ -136,7 +136,10 @@ def test_files_of_the_task_are_offered_and_no_others(served):
         assert ask(server, path)[0].status == 404
 
 
-@pytest.mark.parametrize("path", ["/", "/page.css", "/page.js", "/panels.js", "/charts.js"])
+@pytest.mark.parametrize(
+    "path",
+    ["/", "/look.css", "/page.css", "/page.js", "/elements.js", "/panels.js", "/charts.js", "/theme.js"],
+)
 def test_the_page_needs_nothing_from_elsewhere(served, path):
     _, server = served
     answer, body = ask(server, path)

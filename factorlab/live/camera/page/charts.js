@@ -1,6 +1,6 @@
 // Small line charts of the last seconds.
 
-import { element, shape } from "/panels.js";
+import { element, shape } from "/elements.js";
 
 const SECONDS = 12;
 const WIDTH = 300;

@@ -1,8 +1,9 @@
 // The page of a live camera: a picture, the state behind it, and buttons that send commands.
 
-import { element, fill, quantity, table } from "/panels.js";
-import { drawPanel } from "/panels.js";
+import { element, fill } from "/elements.js";
+import { drawPanel, quantity, table } from "/panels.js";
 import { Traces } from "/charts.js";
+import { watchTheme } from "/theme.js";
 
 const at = (id) => document.getElementById(id);
 const traces = new Traces(at("traces"));
@@ -128,13 +129,7 @@ function toggle(id) {
   if (id === "marks") send({ do: "overlay", on: !marks });
 }
 
-function theme(next) {
-  document.documentElement.dataset.theme = next;
-  try { localStorage.setItem("theme", next); } catch { /* a private window keeps nothing */ }
-}
-
 for (const id of ["pause", "record", "marks"]) at(id).addEventListener("click", () => toggle(id));
-at("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("button, a, input")) return;
   const key = event.key.toLowerCase();
@@ -145,9 +140,7 @@ document.addEventListener("keydown", (event) => {
   if (task) send({ do: "task", name: task.name });
 });
 
-let kept = null;
-try { kept = localStorage.getItem("theme"); } catch { /* as above */ }
-theme(kept ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
+watchTheme(at("theme"));
 
 addEventListener("load", () => {
   at("picture").src = "/stream.mjpg"; // after the page is complete: a stream never is
