@@ -30,7 +30,7 @@ def main(request: Mapping[str, Any]) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.dup2(nowhere, 2)
-    sys.stdout = sys.stderr = heard = Listener()  # type: ignore[assignment]
+    sys.stdout = sys.stderr = heard = Listener()
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
 
     def emit(kind: str, value: Any) -> None:

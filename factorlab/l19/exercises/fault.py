@@ -25,7 +25,7 @@ GLOSSES: tuple[tuple[type[BaseException], str, str], ...] = (
     (ValueError, "broadcast", "les dimensions de ces tableaux ne s'accordent pas"),
     (ValueError, "aligned", "les dimensions de ce produit ne s'accordent pas"),
     (ValueError, "truth value", "une condition (if, and, not) porte sur un tableau entier"),
-    (EOFError, "", "input() attend le clavier ; donnez la valeur en argument, ou sous if __name__ == '__main__'"),
+    (EOFError, "", "input() attend le clavier ; mettez cette ligne sous if __name__ == '__main__'"),
     (FileNotFoundError, "", "le fichier n'est pas dans le dossier de votre programme"),
     (SystemExit, "", "le programme s'arrête de lui-même (sys.exit, quit)"),
 )  # fmt: skip

@@ -70,7 +70,7 @@ def run_student(
         "arguments": dict(arguments or {}),
         "loading_s": loading_s,
     }
-    with subprocess.Popen(
+    with subprocess.Popen(  # noqa: S603 - this interpreter, with our own module
         [sys.executable, "-P", "-m", CHILD, json.dumps(request)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
