@@ -66,7 +66,7 @@ def main():
     for name, (q, noise) in settings.items():
         runs[name], told[name] = judge(q, noise, drive)
         print("{:9}: erreur {rms:.2f} m pour {announced:.2f} m annoncés ; dans ±2σ : {inside:.0f} % ; "
-              "NIS {nis:.1f} ; corrélation des innovations {echo:+.2f}".format(name, **told[name]))  # fmt: skip
+              "NIS {nis:.1f} ; innovations corrélées à {echo:+.2f}".format(name, **told[name]))  # fmt: skip
 
     small_r, small_q, right = (told[name] for name in settings)
     claim("P1", "vérité dans ±2σ, filtre réglé (95 % attendus)", right["inside"], "%", low=91, high=99)
