@@ -29,11 +29,12 @@ def density(x, mean, sigma):
 
 
 def main():
-    from figures import BLUE, GREEN, ORANGE, panels, save
+    from claims import claim
+    from figures import BLUE, GREEN, ORANGE, panels, save, say
 
     mean, sigma0, z, r = 20.0, 2.0, 23.0, 1.0
     after, sigma, gain = bayes(mean, sigma0, z, r)
-    print(f"K = {gain:.2f} : {mean} ± {sigma0} et {z} ± {r} donnent {after:.2f} ± {sigma:.3f} °C")
+    say(f"K = {gain:.2f} : {mean} ± {sigma0} et {z} ± {r} donnent {after:.2f} ± {sigma:.3f} °C")
 
     # la règle de Bayes sans formule : multiplier les deux courbes point par point, puis normaliser
     x = np.linspace(5.0, 40.0, 20_001)
@@ -61,12 +62,14 @@ def main():
     ratio = np.logspace(-2, 2, 200)
     b.semilogx(ratio, 1 / (1 + ratio**2), color=BLUE, label="K")
     b.semilogx(ratio, np.sqrt(1 - 1 / (1 + ratio**2)), color=GREEN, label="σ / σ0 après la mesure")
-    b.set(title="Bonne mesure : K → 1 ; mauvaise : K → 0", xlabel="r / σ0", ylabel="sans unité")
+    b.set(title="Bonne mesure : K → 1 ; mauvaise : K → 0", xlabel="r / σ0", ylabel="K, σ / σ0 (sans unité)")
     b.legend()
     save(figure)
 
-    assert np.isclose(grid_mean, after, atol=1e-6), "la formule est la règle de Bayes"
-    assert np.isclose(grid_sigma, sigma, atol=1e-6)
+    claim("C2", "gain K, avant ± 2 °C, mesure ± 1 °C (4/5)", gain, low=0.7999, high=0.8001)
+    off = max(abs(grid_mean - after), abs(grid_sigma - sigma))
+    claim("C2", "écart entre la formule et le produit des deux courbes", off, "°C", high=1e-6)
+    claim("C2", "écart-type après la mesure (√0,8)", sigma, "°C", low=0.894, high=0.895)
     assert np.isclose(1 / sigma**2, 1 / sigma0**2 + 1 / r**2), "les précisions s'ajoutent"
     for worse in (1.0, 10.0, 1000.0):
         assert bayes(mean, sigma0, z, worse)[1] < sigma0, "la variance diminue toujours"

@@ -30,13 +30,15 @@ def kalman_1d(z, Q, R, x, P):
 
 
 def main():
-    from figures import BLUE, GREEN, ORANGE, READINGS, TRUTH, panels, save
+    from claims import claim
+    from figures import BLUE, GREEN, ORANGE, READINGS, TRUTH, panels, save, say
 
     rng = np.random.default_rng(3)
     Q, R = 0.05**2, 0.5**2  # °C² par seconde ; °C²
     truth = 20.0 + np.cumsum(np.sqrt(Q) * rng.standard_normal(600))
     z = truth + np.sqrt(R) * rng.standard_normal(600)
     estimates = {factor: kalman_1d(z, Q, factor * R, x=15.0, P=4.0**2) for factor in (0.05, 1.0, 20.0)}
+    rms = {factor: np.sqrt(np.mean((x - truth)[50:] ** 2)) for factor, (x, _, _) in estimates.items()}
 
     # le même filtre avec la bibliothèque
     model = sq.StateSpace(
@@ -52,25 +54,16 @@ def main():
     a.plot(z, label="mesures, σ = 0,5 °C", **READINGS)
     for (factor, (x, P, K)), colour in zip(estimates.items(), (ORANGE, GREEN, BLUE), strict=True):
         name = "bon R" if factor == 1.0 else f"R × {factor:g}"
-        print(f"{name:9}: K de {K[0]:.2f} à {K[-1]:.3f}, erreur RMS {np.std((x - truth)[50:]):.3f} °C, "
+        say(f"{name:9}: K de {K[0]:.2f} à {K[-1]:.3f}, erreur RMS {rms[factor]:.3f} °C, "
               f"σ annoncé {np.sqrt(P[-1]):.3f} °C")  # fmt: skip
         a.plot(x, color=colour, label=name)
         b.semilogy(K, color=colour, label=name)
     a.plot(truth, label="vérité", **TRUTH)
-    a.set(
-        title="Estimation, x₀ = 15 °C",
-        xlabel="temps (s)",
-        ylabel="température (°C)",
-        xlim=(0, 200),
-        ylim=(16.5, 21.5),
-    )
+    a.set(title="Estimation, x₀ = 15 °C", xlabel="temps (s)", ylabel="température (°C)")
+    a.set(xlim=(0, 200), ylim=(16.5, 21.5))
     a.legend(ncols=2, loc="lower right")
-    b.set(
-        title="Gain K : grand au début, puis constant",
-        xlabel="temps (s)",
-        ylabel="K (sans unité)",
-        xlim=(-3, 200),
-    )
+    b.set(title="Gain K : grand au début, puis constant", xlabel="temps (s)", ylabel="K (sans unité)")
+    b.set(xlim=(-3, 200))
     b.legend()
     save(figure)
 
@@ -80,8 +73,11 @@ def main():
     assert estimates[20.0][2][-1] < good[2][-1] < estimates[0.05][2][-1], "R grand : K petit"
     assert kalman_1d(z, Q, 1e9, 15.0, 1.0)[2][0] < 1e-8, "R → ∞ : K → 0"
     assert kalman_1d(z, Q, R, 15.0, 1e9)[2][0] > 1 - 1e-8, "P → ∞ : K → 1"
-    rms = {factor: np.sqrt(np.mean((x - truth)[50:] ** 2)) for factor, (x, _, _) in estimates.items()}
-    assert min(rms, key=rms.get) == 1.0, "le bon R est le meilleur"
+    claim("K1", "gain K installé, bon R", good[2][-1], low=0.09, high=0.10)
+    claim("K1", "gain K installé, R 20 fois trop grand", estimates[20.0][2][-1], low=0.02, high=0.025)
+    claim("K1", "erreur RMS, bon R", rms[1.0], "°C", low=0.13, high=0.19)
+    claim("K1", "erreur RMS, R 20 fois trop grand, sur celle du bon R", rms[20.0] / rms[1.0], low=1.1)
+    claim("K1", "erreur RMS, R 20 fois trop petit, sur celle du bon R", rms[0.05] / rms[1.0], low=1.1)
 
 
 if __name__ == "__main__":

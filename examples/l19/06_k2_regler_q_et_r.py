@@ -1,10 +1,10 @@
 """K2. Régler Q et R : R au repos, Q pour un NIS moyen de 1, et un portillon de Mahalanobis.
 
 NIS = νᵀ S⁻¹ ν : l'innovation ν au carré, en unités de sa variance annoncée S.  Si le filtre dit vrai, sa
-moyenne est le nombre de composantes de la mesure (1 ici).  NIS >> 1 : trop sûr de lui, augmenter Q (ou R
-s'il vient d'une notice) ; NIS << 1 : trop prudent, diminuer Q.  Le portillon refuse une mesure si NIS >
-χ² ; un seuil fixe en mètres ne sait pas que l'incertitude grandit quand le capteur se tait, et refuse
-alors les bonnes mesures, pour toujours.
+moyenne est le nombre de composantes de la mesure (1 ici).  NIS >> 1 : trop sûr de lui, augmenter Q (ou R,
+s'il vient d'une notice) ; NIS << 1 : trop prudent, diminuer Q.  Le portillon de Mahalanobis refuse une mesure
+si son NIS dépasse le χ² à 99,9 % ; un seuil fixe, en mètres, ne sait pas que l'incertitude grandit quand le
+capteur se tait : il refuse alors les bonnes mesures, pour toujours.
 """
 
 import numpy as np
@@ -52,7 +52,8 @@ def fixed_threshold(q, R, log, threshold_m):
 
 
 def main():
-    from figures import panels, save
+    from claims import claim
+    from figures import panels, save, say
 
     rng = np.random.default_rng(8)
     q_true, sigma_true = 0.5, 0.2
@@ -60,11 +61,9 @@ def main():
     R = np.var(at_rest, ddof=1)
     drive = sq.simulate(cart(q_true, sigma_true**2), np.arange(0, 100, 1 / RATE_HZ), rng)
     q = tune_q(R, drive.log)
-    print(f"R au repos : σ = {np.sqrt(R):.3f} m (vrai : {sigma_true})")
-    print(f"Q par le NIS : q = {q:.2f} m²/s³ (vrai : {q_true}) ; NIS = {mean_nis(q, R, drive.log):.2f}")
     library = sq.tune_by_nis(lambda v: cart(v["q"], R), [sq.Knob("q", 1.0, "m²/s³")], drive.log)
     low, high = library.interval("q")
-    print(f"par la bibliothèque : q = {library.values['q']:.2f}, entre {low:.2f} et {high:.2f} m²/s³")
+    say(f"par la bibliothèque : q = {library.values['q']:.2f}, entre {low:.2f} et {high:.2f} m²/s³")
     grid = np.logspace(-3, 2, 26)
     curve = [mean_nis(value, R, drive.log) for value in grid]
 
@@ -80,21 +79,22 @@ def main():
     fixed = fixed_threshold(q, R, log, threshold_m=1.0)
     after = log["range"].t > 50_000_000_000
     rms_gate, rms_fixed = (np.sqrt(np.mean((y - truth)[after] ** 2)) for y in (gated.mean[:, 0], fixed))
-    print(f"Mahalanobis : {np.sum(~accepted)} refus pour {np.sum(bad)} aberrantes, {rms_gate:.2f} m d'erreur")
-    print(f"seuil fixe de 1 m : {rms_fixed:.1f} m d'erreur, perdu après le silence")
+    say(f"Mahalanobis : {np.sum(~accepted)} refus pour {np.sum(bad)} aberrantes")
 
     figure, (a, b) = panels(1, 2, size=(11.5, 4.2), title="K2. R au repos, Q par le NIS, puis un portillon")
     draw_nis(a, grid, curve, q, q_true)
     draw_gate(b, log, truth, gated, fixed)
     save(figure)
 
-    assert abs(np.sqrt(R) / sigma_true - 1) < 0.15, "R mesuré au repos"
-    assert 0.4 < q / q_true < 2.5, "Q par le NIS"
+    claim("K2", "NIS moyen une fois Q réglé", mean_nis(q, R, drive.log), low=0.99, high=1.01)
+    claim("K2", "σ mesuré au repos (vrai : 0,2)", np.sqrt(R), "m", low=0.17, high=0.23)
+    claim("K2", "q réglé par le NIS (vrai : 0,5)", q, "m²/s³", low=0.2, high=1.25)
+    claim("K2", "erreur RMS après le silence, portillon de Mahalanobis", rms_gate, "m", high=0.3)
+    claim("K2", "erreur RMS après le silence, seuil fixe de 1 m", rms_fixed, "m", low=5)
     assert 0.7 < library.values["q"] / q < 1.4, "à la main et par la bibliothèque"
     assert curve[0] / 3.0 > 1.0 > curve[-1], "trop sûr de lui, puis trop prudent"
     assert (~accepted[bad]).all(), "aucune aberrante n'entre"
     assert np.sum(~accepted & ~bad) <= 5, "et presque rien d'autre n'est refusé"
-    assert 10 * rms_gate < 5.0 < rms_fixed
 
 
 def draw_nis(a, grid, curve, q, q_true):
@@ -105,8 +105,8 @@ def draw_nis(a, grid, curve, q, q_true):
     a.axhline(1.0, color="black", linewidth=0.8)
     a.axvline(q_true, color=figures.GREEN, linestyle="--", label="q vrai")
     a.plot(q, 1.0, "o", color=figures.ORANGE, label=f"q choisi : {q:.2f} m²/s³")
-    a.text(1.3e-3, 1.3, "trop sûr de lui", va="bottom")
-    a.text(1.3e-3, 0.85, "trop prudent", va="top")
+    a.text(1.3e-3, 1.05, "trop sûr de lui", va="bottom")
+    a.text(1.3e-3, 0.95, "trop prudent", va="top")
     a.set(title="Le NIS décroît avec Q", xlabel="densité d'accélération q (m²/s³)", ylabel="NIS moyen")
     a.legend(loc="upper right")
 
@@ -124,8 +124,9 @@ def draw_gate(b, log, truth, gated, fixed):
     b.set(title="Après 8 s de silence, le seuil fixe refuse tout", xlabel="temps (s)", ylabel="position (m)")
     b.set_xlim(30, 70)
     inside = (s > 30) & (s < 70)
-    b.set_ylim(truth[inside].min() - 25, truth[inside].max() + 45)
-    b.legend(loc="upper left", fontsize=8)
+    b.axvspan(40, 48, color="#eeeeee", label="capteur muet")
+    b.set_ylim(truth[inside].min() - 25, truth[inside].max() + 35)
+    b.legend(loc="lower left", fontsize=8)
 
 
 if __name__ == "__main__":

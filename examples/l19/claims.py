@@ -6,7 +6,7 @@ line; `factorlab l19 rapport` gathers them.
 
 import json
 
-from figures import out_folder, script_name
+from figures import french, out_folder, say, script_name
 
 _begun = set()
 
@@ -35,9 +35,9 @@ def claim(item, quantity, value, unit="", *, low=None, high=None, source="simulÃ
     with path.open("a" if path in _begun else "w", encoding="utf-8") as file:
         file.write(json.dumps(row | {"source": source}, ensure_ascii=False) + "\n")
     _begun.add(path)
-    print(f"{item} : {quantity} = {value:.4g}{' ' if unit else ''}{unit}{_said(low, high)}")
-    assert low is None or value >= low, f"{quantity} : {value:.4g} {unit}, au moins {low:g} attendu"
-    assert high is None or value <= high, f"{quantity} : {value:.4g} {unit}, au plus {high:g} attendu"
+    say(f"{item} : {quantity} = {value:.4g}{' ' if unit else ''}{unit}{_said(low, high)}")
+    assert low is None or value >= low, french(f"{quantity} : {value:.4g} {unit}, au moins {low:g} attendu")
+    assert high is None or value <= high, french(f"{quantity} : {value:.4g} {unit}, au plus {high:g} attendu")
 
 
 def _said(low, high):

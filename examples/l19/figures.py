@@ -1,15 +1,21 @@
 """How the course's figures look, and where they go: drawn with Agg, saved beside `-o`, never shown.
 
+Numbers are shown as French writes them, with a decimal comma: `save` sees to a figure's, `say` to a
+sentence's.
+
 Not an example: the scripts of this folder import it.
 """
 
 import argparse
+import re
 import sys
 from pathlib import Path
 
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import ScalarFormatter
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart
 TRUTH = {"color": "black", "linewidth": 1.6, "linestyle": "--", "zorder": 4}
@@ -42,6 +48,24 @@ def panels(rows=1, columns=1, *, size=(8.0, 4.0), title="", **grid):
     return figure, list(figure.subplots(rows, columns, squeeze=False, **grid).ravel())
 
 
+class CommaFormatter(ScalarFormatter):
+    """Plain tick labels with a decimal comma."""
+
+    def __call__(self, x, pos=None):
+        """The label of the tick at x."""
+        return super().__call__(x, pos).replace(".", ",")
+
+
+def french(text):
+    """The text with a decimal comma in each of its numbers."""
+    return re.sub(r"(?<=\d)\.(?=\d)", ",", text)
+
+
+def say(text):
+    """Print a sentence, its numbers as French writes them."""
+    print(french(text))
+
+
 def out_folder():
     """The folder that `-o` names, build/l19 unless given; made when it is missing."""
     parser = argparse.ArgumentParser(description=sys.modules["__main__"].__doc__)
@@ -59,5 +83,19 @@ def script_name():
 def save(figure, part=""):
     """Write the figure as SCRIPT.png, or SCRIPT_PART.png, into the folder that `-o` names."""
     path = out_folder() / f"{script_name()}{'_' if part else ''}{part}.png"
+    _in_french(figure)
     figure.savefig(path, dpi=110)
     print(f"figure : {path}")
+
+
+def _in_french(figure):
+    """A decimal comma in all that the figure says: its words, and its plain tick labels."""
+    for text in figure.findobj(Text):
+        text.set_text(french(text.get_text()))
+    for axes in figure.axes:
+        for axis in filter(None, (axes.xaxis, axes.yaxis, getattr(axes, "zaxis", None))):
+            plain = axis.get_major_formatter()
+            if type(plain) is ScalarFormatter:
+                comma = CommaFormatter()
+                vars(comma).update(vars(plain))
+                axis.set_major_formatter(comma)
