@@ -15,66 +15,83 @@ Procédure de réglage, pour n'importe quel capteur :
  9. Vérifier le retard sur un échelon et l'erreur RMS : s'ils ne conviennent pas, c'est le modèle qu'il
     faut changer.
 10. Vérifier le NIS sur un autre enregistrement que celui du réglage.
+
+Les étapes 6 à 8 s'automatisent : cet exemple écrit `mesures.csv` et `modele.py`, et
+`factorlab tune mesures.csv --model modele.py:modele --method nis` trouve le même q.  Le défi noté, sur des
+enregistrements que l'on ne connaît pas d'avance : `factorlab l19 defi mon_filtre.py`.
 """
 
 import numpy as np
+from scipy.stats import chi2
 
 import sequential as sq
+from factorlab.l19.challenge import public_trial
+from factorlab.l19.challenge.files import TUNE, starting_files
 from sequential.signal import measure_step_delay
 
 SIGMA, GATE = 0.5, 0.999
-T = np.arange(240.0)
-TRUTH_C = np.where(T < 120, 20 + 0.25 * T, 50.0)  # °C : rampe puis palier
-PLATEAU = slice(200, 230)  # 30 s
-
-
-def record(rng):
-    """Mesures à 1 Hz, et l'aberrante."""
-    z = TRUTH_C + SIGMA * rng.standard_normal(len(T))
-    z[40] += 8.0
-    return z
+MOST = chi2.ppf(GATE, 1)  # le seuil du portillon
+TRIAL = public_trial()
+T, TRUTH_C = TRIAL.t, TRIAL.truth
 
 
 def kalman(z, q, R, gate=GATE, t=T):
     """Kalman (température, pente) sur les mesures z, prises aux instants t."""
-    sensors = {"thermometer": sq.LinearSensor([[1.0, 0.0]], R, gate=gate)}
+    sensors = {"thermometre": sq.LinearSensor([[1.0, 0.0]], R, gate=gate)}
     prior = sq.Gaussian([z[0], 0.0], [1.0, 0.25])
     model = sq.StateSpace(sq.Vector(2), prior, sq.ConstantVelocity(q), sensors)
-    return sq.run(sq.KalmanFilter(), model, sq.SensorLog({"thermometer": sq.Stream(t, z)}))
+    return sq.run(sq.KalmanFilter(), model, sq.SensorLog({"thermometre": sq.Stream(t, z)}))
 
 
 def mean_nis(z, q, R):
-    """NIS moyen sans portillon, sur les mesures qu'une médiane locale ne désavoue pas, les premières exclues.
+    """NIS moyen ; une mesure refusée compte pour le seuil, ni plus ni zéro.
 
-    Avec le portillon, un q bien trop petit aurait un beau NIS : celui des rares mesures qu'il accepte encore.
+    Ne compter que les mesures acceptées flatterait un q bien trop petit : il n'accepte que celles qui lui
+    donnent raison.  Le diviseur est la moyenne d'un χ² ainsi plafonné.
     """
-    sound = ~sq.Hampel(9, centred=True, threshold=4.0).outliers(z)
-    run = kalman(z[sound], q, R, gate=None, t=T[sound])
-    return float(np.mean(run.innovations["thermometer"].nis()[10:]))
+    nis = kalman(z, q, R).innovations["thermometre"].nis()
+    capped = chi2.cdf(MOST, 3) + MOST * chi2.sf(MOST, 1)
+    return float(np.mean(np.minimum(nis, MOST))) / capped
 
 
-def tune_q(z, R, low=1e-7, high=1.0):
+def tune_q(z, R, low=1e-5, high=1.0):
     """Le bouton q pour lequel le NIS moyen vaut 1."""
-    for _ in range(40):
+    for _ in range(25):
         middle = np.sqrt(low * high)
         low, high = (middle, high) if mean_nis(z, middle, R) > 1.0 else (low, middle)
     return np.sqrt(low * high)
 
 
+def tuned_by_command(folder):
+    """Écrire l'enregistrement et le modèle, et régler q comme le fait `factorlab tune`."""
+    from factorlab.compare.own import own_dataset
+    from factorlab.tuning import tune_dataset
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in starting_files(TRIAL).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    dataset = own_dataset(folder / "mesures.csv", f"{folder / 'modele.py'}:modele")
+    return tune_dataset(dataset, "nis").tuning
+
+
+def rms(error):
+    return float(np.sqrt(np.mean(error**2)))
+
+
 def main():
-    from figures import BLUE, GREEN, ORANGE, PINK, READINGS, TRUTH, panels, save
+    from claims import claim
+    from figures import out_folder
 
     print("\n".join(__doc__.splitlines()[5:]))
-    z = record(np.random.default_rng(14))
-    R = np.var(z[PLATEAU], ddof=1)
+    z = TRIAL.z
+    R = np.var(z[TRIAL.rest], ddof=1)
     q = tune_q(z, R)
-    run = kalman(z, q, R)
-    seen = run.innovations["thermometer"]
-    print(f"R : σ = {np.sqrt(R):.2f} °C ; q = {q:.2g} °C²/s³ ; NIS = {mean_nis(z, q, R):.2f} ; "
-          f"refusées : t = {seen.t[~seen.accepted] // 1_000_000_000} s")  # fmt: skip
-
-    print(f"30 mesures ne donnent σ qu'à 13 % près, et q en dépend beaucoup : {tune_q(z, R * 1.13**2):.1g} à "
-          f"{tune_q(z, R / 1.13**2):.1g}")  # fmt: skip
+    seen = kalman(z, q, R).innovations["thermometre"]
+    print(f"\nR : σ = {np.sqrt(R):.2f} °C ; refusées : t = {seen.t[~seen.accepted] // 1_000_000_000} s")
+    folder = out_folder() / "defi_d1"
+    found = tuned_by_command(folder)
+    print(f"dans {folder} :  {TUNE}\n  q = {found.values['q']:.3g} °C²/s³, à 95 % de "
+          f"{found.interval('q')[0]:.1g} à {found.interval('q')[1]:.1g} : le NIS dépend peu de q")  # fmt: skip
 
     low, median = sq.LowPass(coefficient=0.2, interval=1.0), sq.SlidingMedian(9)
     filters = {
@@ -90,10 +107,26 @@ def main():
         # un petit échelon, d'un σ : un portillon prend d'abord un grand échelon pour des aberrantes
         delay[name] = measure_step_delay(lambda t, x, smooth=smooth: smooth(t, SIGMA * x) / SIGMA, 1.0)
         error = outputs[name] - TRUTH_C
-        ramp[name], plateau[name] = (
-            np.sqrt(np.mean(error[s] ** 2)) for s in (slice(20, 120), slice(160, 240))
-        )
+        ramp[name], plateau[name] = rms(error[TRIAL.ramp]), rms(error[TRIAL.plateau])
         print(f"{name:24}{delay[name]:12.0f} s{ramp[name]:9.2f} °C{plateau[name]:9.2f} °C")
+
+    draw(z, R, q, outputs)
+    claim("D1", "RMS du Kalman réglé sur la rampe", ramp["Kalman"], "°C", low=0.1, high=0.3)
+    claim("D1", "RMS du passe-bas sur la rampe", ramp["passe-bas (a = 0,2)"], "°C", low=0.8, high=1.2)
+    claim("D1", "RMS du Kalman réglé sur le palier", plateau["Kalman"], "°C", high=0.3)
+    claim("D1", "retard du Kalman à 90 % d'un échelon", delay["Kalman"], "s", low=2, high=8)
+    claim("D1", "q de factorlab tune sur q trouvé à la main", found.values["q"] / q, low=0.95, high=1.05)
+    assert 0.35 < np.sqrt(R) < 0.65, "R mesuré sur 30 s de palier : à 13 % près en moyenne"
+    assert abs(mean_nis(z, q, R) - 1.0) < 0.05, "Q réglé"
+    assert not seen.accepted[40], "l'aberrante est refusée"
+    assert np.sum(~seen.accepted) <= 3, "et presque rien d'autre"
+    assert ramp["Kalman"] < 0.5 * ramp["médiane (k = 9)"], "il connaît la pente : pas de traînage"
+    assert delay["médiane (k = 9)"] == median.response(1.0).delay_90
+    assert delay["passe-bas (a = 0,2)"] == low.response(1.0).delay_90
+
+
+def draw(z, R, q, outputs):
+    from figures import BLUE, GREEN, ORANGE, PINK, READINGS, TRUTH, panels, save
 
     figure, (a, b, c) = panels(
         1, 3, size=(14.0, 4.3), title="D1. Une température : Kalman, passe-bas, médiane"
@@ -107,23 +140,13 @@ def main():
     a.set(title="L'aberrante de +8 °C à t = 40 s", xlim=(30, 60), ylim=(26, 43))
     b.set(title="Fin de rampe", xlim=(105, 150), ylim=(44, 53))
     a.legend(loc="upper right", fontsize=8)
-    grid = np.logspace(-6, 0, 25)
+    grid = np.logspace(-5, 0, 25)
     c.loglog(grid, [mean_nis(z, value, R) for value in grid], color=BLUE, marker=".", label="NIS moyen")
     c.axhline(1.0, color="black", linewidth=0.8)
-    c.plot(q, 1.0, "o", color=ORANGE, label=f"q choisi : {q:.1g} °C²/s³")
+    c.plot(q, 1.0, "o", color=ORANGE, label=f"q choisi : {q:.1g} °C²/s³".replace(".", ","))
     c.set(title="Choisir Q par le NIS", xlabel="densité q (°C²/s³)", ylabel="NIS (sans unité)")
     c.legend()
     save(figure)
-
-    assert 0.35 < np.sqrt(R) < 0.65, "R mesuré sur 30 s de palier : à 13 % près en moyenne"
-    assert abs(mean_nis(z, q, R) - 1.0) < 0.05, "Q réglé"
-    assert not seen.accepted[40], "l'aberrante est refusée"
-    assert np.sum(~seen.accepted) <= 3, "et presque rien d'autre"
-    assert ramp["Kalman"] < 0.5 * ramp["passe-bas (a = 0,2)"], "il connaît la pente : pas de traînage"
-    assert ramp["Kalman"] < 0.5 * ramp["médiane (k = 9)"]
-    assert plateau["Kalman"] < SIGMA / 1.5
-    assert delay["médiane (k = 9)"] == median.response(1.0).delay_90
-    assert delay["passe-bas (a = 0,2)"] == low.response(1.0).delay_90
 
 
 if __name__ == "__main__":
