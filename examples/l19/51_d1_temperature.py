@@ -90,8 +90,11 @@ def main():
     print(f"\nR : σ = {np.sqrt(R):.2f} °C ; refusées : t = {seen.t[~seen.accepted] // 1_000_000_000} s")
     folder = out_folder() / "defi_d1"
     found = tuned_by_command(folder)
-    print(f"dans {folder} :  {TUNE}\n  q = {found.values['q']:.3g} °C²/s³, à 95 % de "
-          f"{found.interval('q')[0]:.1g} à {found.interval('q')[1]:.1g} : le NIS dépend peu de q")  # fmt: skip
+    least, most = found.interval("q")
+    print(f"dans {folder} :  {TUNE}")
+    print(
+        f"  q = {found.values['q']:.3g} °C²/s³, à 95 % de {least:.1g} à {most:.1g} : le NIS dépend peu de q"
+    )
 
     low, median = sq.LowPass(coefficient=0.2, interval=1.0), sq.SlidingMedian(9)
     filters = {
@@ -131,17 +134,19 @@ def draw(z, R, q, outputs):
     figure, (a, b, c) = panels(
         1, 3, size=(14.0, 4.3), title="D1. Une température : Kalman, passe-bas, médiane"
     )
+    # loin de l'aberrante les deux Kalman se confondent : l'un est plus épais
+    looks = (GREEN, 3.0), (PINK, 1.3), (BLUE, 1.5), (ORANGE, 1.5)
     for axes in (a, b):
         axes.plot(T, z, label="mesures", **READINGS)
-        for (name, y), colour in zip(outputs.items(), (GREEN, PINK, BLUE, ORANGE), strict=True):
-            axes.plot(T, y, color=colour, label=name)
+        for (name, y), (colour, width) in zip(outputs.items(), looks, strict=True):
+            axes.plot(T, y, color=colour, linewidth=width, label=name)
         axes.plot(T, TRUTH_C, label="vérité", **TRUTH)
         axes.set(xlabel="temps (s)", ylabel="température (°C)")
-    a.set(title="L'aberrante de +8 °C à t = 40 s", xlim=(30, 60), ylim=(26, 43))
+    a.set(title="L'aberrante de +8 °C à t = 40 s", xlim=(30, 60), ylim=(26, 44))
     b.set(title="Fin de rampe", xlim=(105, 150), ylim=(44, 53))
-    a.legend(loc="upper right", fontsize=8)
+    a.legend(loc="upper right", fontsize=8, ncols=2)
     grid = np.logspace(-5, 0, 25)
-    c.loglog(grid, [mean_nis(z, value, R) for value in grid], color=BLUE, marker=".", label="NIS moyen")
+    c.semilogx(grid, [mean_nis(z, value, R) for value in grid], color=BLUE, marker=".", label="NIS moyen")
     c.axhline(1.0, color="black", linewidth=0.8)
     c.plot(q, 1.0, "o", color=ORANGE, label=f"q choisi : {q:.1g} °C²/s³".replace(".", ","))
     c.set(title="Choisir Q par le NIS", xlabel="densité q (°C²/s³)", ylabel="NIS (sans unité)")

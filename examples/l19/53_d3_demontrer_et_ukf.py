@@ -5,33 +5,29 @@
    nulle : K = a / (a + b), et Var = ab / (a + b), soit 1/Var = 1/a + 1/b.  C'est le gain de Kalman 1-D,
    sans même supposer de gaussienne.
 
-2. Le gain K = P Hᵀ (H P Hᵀ + R)⁻¹ minimise la trace de la covariance après correction.  Pour un gain K
-   quelconque, x̂ = x + K (z - H x) a pour covariance (forme de Joseph)
-   P(K) = (I - K H) P (I - K H)ᵀ + K R Kᵀ.  En posant S = H P Hᵀ + R :
-   tr P(K) = tr P - 2 tr(K H P) + tr(K S Kᵀ).  Son gradient selon K, -2 P Hᵀ + 2 K S, est nul pour
-   K = P Hᵀ S⁻¹.  S est définie positive, donc c'est un minimum, et le seul :
-   tr P(K + D) = tr P(K) + tr(D S Dᵀ) ≥ tr P(K), pour tout écart D.
+2. Le gain K = P Hᵀ (H P Hᵀ + R)⁻¹ minimise la trace de la covariance après correction : en posant
+   S = H P Hᵀ + R, tr P(K + D) = tr P(K) + tr(D S Dᵀ) ≥ tr P(K) pour tout écart D (figure, à gauche).
 
 3. UKF.  L'EKF remplace la fonction par sa tangente ; l'UKF garde la fonction et remplace la gaussienne
    par 2n + 1 points qui ont sa moyenne et sa covariance.  Les angles se moyennent sur le cercle.  Ici, sous
-   fort bruit et après 15 s à l'aveugle, l'EKF se perd dans 10 à 30 % des essais selon le tirage, l'UKF dans
-   0 à 5 % : bien mieux, mais pas infaillible.  Sous faible bruit ils font jeu égal (voir K3).
+   fort bruit et après 15 s à l'aveugle, l'EKF se perd dans 10 à 25 % des essais selon le tirage, l'UKF dans
+   1 à 4 % : bien mieux, mais pas infaillible.  Aucun des deux n'est alors honnête (NEES bien au-dessus de
+   3).  Sous faible bruit ils font jeu égal.
 
-4. Kalman, 1960.  L'article paraît dans une revue de génie mécanique (ASME, Journal of Basic Engineering),
-   et non d'électronique ; l'accueil fut d'abord sceptique, dit-on.  Il raisonnait en espace d'état et dans
-   le temps, quand la théorie du filtrage (Wiener) se faisait en fréquence, et sa solution demandait un
-   calculateur.  L'équipe de S. Schmidt, à la NASA Ames, l'adopta pour la navigation d'Apollo.
+Toutes les démonstrations, et l'histoire de l'article de 1960, sont dans docs/derivations.fr.md ; chacune de
+leurs formules est vérifiée par 54_d3_formules.py.
 """
 
 from dataclasses import replace
+from time import perf_counter
 
 import numpy as np
 
 import sequential as sq
+from factorlab.l19.contest import BLIND_S, DT_S, LOST_M, contest, robot
+from sequential.evaluate import chi2_band
 
-LANDMARKS_M = np.array([[0.0, 0.0], [25.0, 0.0], [0.0, 25.0]])
-DT_S, BLIND_S, RUNS = 0.5, 15, 80
-LOST_M = 3.0
+RUNS = 200
 
 
 def points_sigma(x, P, kappa):
@@ -56,39 +52,6 @@ def corriger_ukf(x, P, observe, z, R, kappa):
     S = weights @ (seen - expected) ** 2 + R
     K = (points - x).T @ (weights * (seen - expected)) / S
     return x + K * (z - expected), P - np.outer(K, K) * S
-
-
-def robot(start=None):
-    """Robot différentiel, fort bruit : cap initial à 40° près, relèvements à 29° près, distances à 5 cm."""
-    return sq.StateSpace(
-        manifold=sq.SE2(),
-        prior=sq.Gaussian([2.0, 1.0, 0.5], np.array([0.2, 0.2, 0.7]) ** 2),
-        process=sq.Unicycle(along=0.3, across=0.1, heading=0.3),
-        sensors={"landmarks": sq.RangeBearing(LANDMARKS_M, np.array([0.05, 0.5]) ** 2)},
-        input="wheels",
-        start=start,
-    )
-
-
-def monte_carlo(rng):
-    """Pire erreur de position (m) des 10 dernières secondes et NEES final, par filtre et par essai."""
-    model, t = robot(start=0.0), np.arange(0, 45, DT_S)
-    wheels = np.tile([1.0, 0.1], (len(t), 1))
-    sights = np.arange(int(BLIND_S / DT_S), len(t), int(1 / DT_S))  # d'abord à l'aveugle
-    which = (np.arange(len(sights)) % 3.0)[:, None]
-    filters = sq.ExtendedKalmanFilter(), sq.UnscentedKalmanFilter()
-    worst, nees = {f.name: [] for f in filters}, {f.name: [] for f in filters}
-    for _ in range(RUNS):
-        drive = sq.simulate(
-            model, t, rng, inputs=wheels, readings={"landmarks": sights}, contexts={"landmarks": which}
-        )
-        for chosen in filters:
-            run = sq.run(chosen, model, drive.log, at=t)
-            off = np.hypot(*(run.mean - drive.truth)[t > 35, :2].T)
-            error = model.manifold.local(run.mean[-1], drive.truth[-1])
-            worst[chosen.name].append(off.max())
-            nees[chosen.name].append(error @ np.linalg.solve(run.cov[-1], error))
-    return {k: np.array(v) for k, v in worst.items()}, {k: np.array(v) for k, v in nees.items()}
 
 
 def other_gains(rng):
@@ -130,62 +93,89 @@ def check_sigma_points():
 
 
 def main():
+    from claims import claim
+
+    excess, expected = other_gains(np.random.default_rng(1))
+    check_sigma_points()
+    contest(runs=2)  # le temps d'un premier essai, qui charge les boucles compilées, ne compte pas
+    began = perf_counter()
+    strong = contest(RUNS)
+    seconds = perf_counter() - began
+    weak = contest(RUNS, noise="weak")
+    low, high = (bound / 3 for bound in chi2_band(3, RUNS))
+    for name in ("ekf", "ukf"):
+        found = strong.worst(name) <= LOST_M
+        late = strong.nees[name][found][:, strong.late].mean() / 3
+        lost, RMSE = np.sum(~found), strong.rmse(name)
+        print(f"{name.upper()}, fort bruit : perdu (à plus de {LOST_M:.0f} m) {lost} fois sur {RUNS} ; RMSE "
+              f"{RMSE:.1f} m\n     ANEES/3 {strong.anees(name).mean / 3:.0f}, ou {late:.1f} sur la fin sans "
+              f"les essais perdus (à 95 % de {low:.2f} à {high:.2f} attendu)")  # fmt: skip
+        print(f"     faible bruit : RMSE {weak.rmse(name):.3f} m ; ANEES/3 {weak.anees(name).mean / 3:.2f}")
+    draw(strong, weak, excess, expected)
+
+    lost = {name: 100 * strong.lost(name) for name in ("ekf", "ukf")}
+    claim("D3", "essais où l'EKF se perd, fort bruit", lost["ekf"], "%", low=8, high=32)
+    claim("D3", "essais où l'UKF se perd, fort bruit", lost["ukf"], "%", high=7)
+    claim(
+        "D3", "RMSE de l'EKF sur celle de l'UKF, fort bruit", strong.rmse("ekf") / strong.rmse("ukf"), low=1.3
+    )
+    claim("D3", "RMSE de l'EKF sur celle de l'UKF, faible bruit", weak.rmse("ekf") / weak.rmse("ukf"),
+          low=0.98, high=1.02)  # fmt: skip
+    claim("D3", "ANEES/3 de l'UKF, faible bruit", weak.anees("ukf").mean / 3, low=0.89, high=1.12)
+    claim("D3", f"temps des {RUNS} essais, deux filtres", seconds, "s")
+    assert (excess > 0).all(), "aucun autre gain ne fait mieux"
+    np.testing.assert_allclose(excess, expected, rtol=1e-6)
+    assert low <= weak.anees("ekf").mean / 3 <= high, "sous faible bruit, l'EKF est honnête aussi"
+    assert strong.anees("ukf").mean < strong.anees("ekf").mean, "l'UKF est moins trop sûr de lui"
+
+
+def draw(strong, weak, excess, expected):
     from figures import BLUE, GREEN, ORANGE, panels, save
 
-    rng = np.random.default_rng(1)
-
-    excess, expected = other_gains(rng)
-    check_sigma_points()
-    worst, nees = monte_carlo(rng)
-    lost = {name: np.mean(values > LOST_M) for name, values in worst.items()}
-    for name, values in worst.items():
-        print(f"{name} : perdu (plus de {LOST_M:.0f} m) {np.sum(values > LOST_M)} fois sur {RUNS} ; sinon "
-              f"{np.median(values[values <= LOST_M]):.2f} m ; NEES médian {np.median(nees[name]):.1f} "
-              "(2,4 attendu)")  # fmt: skip
-
-    figure, (a, b, c) = panels(1, 3, size=(13.5, 4.3), title="D3. Le gain optimal, et l'UKF face à l'EKF")
+    figure, (a, b, c, d) = panels(2, 2, size=(11.5, 8.2), title="D3. Le gain optimal, et l'UKF face à l'EKF")
     a.plot(expected, excess, ".", color=BLUE, markersize=4)
-    a.set(
-        title="1000 gains K + D autour de celui de Kalman",
-        xlabel="tr(D S Dᵀ)",
-        ylabel="tr P(K + D) - tr P(K)",
-    )
-    draw_banana(b, rng, (ORANGE, GREEN))
-    for (name, values), colour in zip(worst.items(), (ORANGE, GREEN), strict=True):
-        c.semilogx(np.sort(values), np.arange(1, RUNS + 1) / RUNS * 100, color=colour, label=name.upper())
+    a.set(title="1000 gains K + D autour de celui de Kalman", xlabel="tr(D S Dᵀ)",
+          ylabel="tr P(K + D) − tr P(K)")  # fmt: skip
+    draw_banana(b, (ORANGE, GREEN))
+    seen = slice(None, None, round(1 / DT_S))  # les instants où un amer vient d'être vu
+    for name, colour in (("ekf", ORANGE), ("ukf", GREEN)):
+        share = np.arange(1, RUNS + 1) / RUNS * 100
+        c.semilogx(np.sort(strong.worst(name)), share, color=colour, label=f"{name.upper()}, fort bruit")
+        for drawn, noise, dashes in ((strong, "fort", "-"), (weak, "faible", "--" if name == "ekf" else ":")):
+            d.semilogy(drawn.t[seen], drawn.anees(name).average[seen] / 3, dashes, color=colour,
+                       label=f"{name.upper()}, {noise} bruit")  # fmt: skip
     c.axvline(LOST_M, color="black", linewidth=0.8, label=f"perdu : plus de {LOST_M:.0f} m")
     c.set(title=f"{RUNS} essais sous fort bruit", xlabel="pire erreur des 10 dernières secondes (m)",
           ylabel="part des essais (%)")  # fmt: skip
+    d.axhline(1.0, color="black", linewidth=0.8)
+    d.set(title="Honnêteté : 1 attendu", xlabel="temps (s)", ylabel="ANEES/3 (sans unité)", ylim=(0.5, 3e6))
     c.legend(loc="lower right")
+    d.legend(loc="upper left", ncols=2)
     save(figure)
 
-    assert (excess > 0).all(), "aucun autre gain ne fait mieux"
-    np.testing.assert_allclose(excess, expected, rtol=1e-6)
-    assert lost["ekf"] > 0.1, "sous fort bruit, l'EKF se perd souvent"
-    assert lost["ukf"] < 0.5 * lost["ekf"], "l'UKF bien moins, mais pas jamais"
-    assert np.median(nees["ukf"]) < np.median(nees["ekf"]), "et il est moins trop sûr de lui"
 
-
-def draw_banana(axes, rng, colours):
+def draw_banana(axes, colours):
     """Après 15 s à l'aveugle : les possibles forment une banane, et la croyance du filtre aussi, sur SE(2).
 
     EKF et UKF en sont là au même point : sur ce robot c'est la correction, pas la prédiction, qui les sépare.
     """
-    model = replace(robot(), sensors={})
+    rng, model = np.random.default_rng(2), robot()
     t = np.arange(0, BLIND_S + DT_S / 2, DT_S)
-    log = sq.SensorLog({"wheels": sq.Stream(t, np.tile([1.0, 0.1], (len(t), 1)))})
-    ekf, ukf = (sq.run(f, model, log, at=t) for f in (sq.ExtendedKalmanFilter(), sq.UnscentedKalmanFilter()))
+    wheels = np.tile([1.0, 0.1], (len(t), 1))
+    log = sq.SensorLog({"wheels": sq.Stream(t, wheels)})
+    blind = replace(model, sensors={})
+    ekf, ukf = (sq.run(f, blind, log, at=t) for f in (sq.ExtendedKalmanFilter(), sq.UnscentedKalmanFilter()))
     np.testing.assert_allclose(ekf.mean[-1], ukf.mean[-1], atol=1e-9)
-    truth = np.array([sq.simulate(robot(0.0), t, rng, inputs=np.tile([1.0, 0.1], (len(t), 1)),
-                                  contexts={"landmarks": [0.0]}).truth[-1] for _ in range(200)])  # fmt: skip
+    truth = np.array([sq.simulate(model, t, rng, inputs=wheels, contexts={"landmarks": [0.0]}).truth[-1]
+                      for _ in range(200)])  # fmt: skip
     steps = rng.standard_normal((200, 3)) @ np.linalg.cholesky(ekf.cov[-1]).T
     belief = model.manifold.retract(ekf.mean[-1], steps)
     axes.plot(truth[:, 0], truth[:, 1], ".", color="#9a9a9a", markersize=5, label="200 essais simulés")
     axes.plot(belief[:, 0], belief[:, 1], ".", color=colours[1], markersize=3, label="croyance du filtre")
     axes.plot(*ekf.mean[-1, :2], "o", color=colours[0], label="moyenne (EKF et UKF)")
     axes.set(title="Après 15 s à l'aveugle : une banane", xlabel="x (m)", ylabel="y (m)")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.update_datalim([(0, -14), (0, 30)])
+    axes.set(xlim=(-28, 28), ylim=(-16, 30))
+    axes.set_aspect("equal")
     axes.legend(loc="upper left", fontsize=8)
 
 

@@ -1,4 +1,4 @@
-"""What a student begins with: the public recording, a model that `factorlab tune` takes, a filter to fill in."""
+"""What a student begins with: the public recording, a model for `factorlab tune`, a filter to fill in."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 import sequential as sq
 from factorlab.l19.challenge.measures import Filter
 from factorlab.l19.challenge.trials import Trial
+from sequential.log import nanoseconds
 
 __all__ = ["GATE", "RIVALS", "TunedNoise", "kalman", "model_of", "rivals", "tuned_noise"]
 
@@ -32,7 +33,7 @@ def model_of(q: float, R: float, first: float, gate: float | None = GATE) -> sq.
     """Temperature and slope; `first` is the first reading, °C."""
     return sq.StateSpace(
         manifold=sq.Vector(2),
-        prior=sq.Gaussian([first, 0.0], [1.0, 0.25]),
+        prior=sq.Gaussian(np.array([first, 0.0]), np.array([1.0, 0.25])),
         process=sq.ConstantVelocity(q),
         sensors={"thermometre": sq.LinearSensor([[1.0, 0.0]], R, gate=gate)},
     )
@@ -42,17 +43,21 @@ def kalman(q: float, R: float, gate: float | None = GATE) -> Filter:
     """A filter f(t, z) -> (N, 2): temperature and its σ, °C."""
 
     def smooth(t: Array, z: Array) -> Array:
-        log = sq.SensorLog({"thermometre": sq.Stream(t, z)})
+        log = sq.SensorLog({"thermometre": sq.Stream(nanoseconds(t), z)})
         run = sq.run(sq.KalmanFilter(), model_of(q, R, float(z[0]), gate), log)
         return np.column_stack([run.mean[:, 0], np.sqrt(run.cov[:, 0, 0])])
 
     return smooth
 
 
+def _raw(t: Array, z: Array) -> Array:
+    return z
+
+
 def tuned_noise(trial: Trial) -> TunedNoise:
     """R from thirty seconds of the plateau, then q by the NIS, as `factorlab tune --method nis` does."""
     R = float(np.var(trial.z[trial.rest], ddof=1))
-    log = sq.SensorLog({"thermometre": sq.Stream(trial.t, trial.z)})
+    log = sq.SensorLog({"thermometre": sq.Stream(nanoseconds(trial.t), trial.z)})
     found = sq.tune_by_nis(
         lambda values: model_of(values["q"], R, float(trial.z[0])), [sq.Knob("q", 1e-3)], log
     )
@@ -62,8 +67,8 @@ def tuned_noise(trial: Trial) -> TunedNoise:
 def rivals(tuned: TunedNoise) -> dict[str, Filter]:
     """By the names of RIVALS."""
     low, median = sq.LowPass(coefficient=0.2, interval=1.0), sq.SlidingMedian(9)
-    filters = (
-        lambda t, z: z,
+    filters: tuple[Filter, ...] = (
+        _raw,
         low,
         median,
         kalman(*UNTUNED, gate=None),
