@@ -13,6 +13,7 @@ from vision3d.lines.mount import CameraMount, planar_pose, plane_homography
 from vision3d.lines.scene import Scene, read_scene
 from vision3d.lines.segments import SegmentSettings, find_segments, merge_segments
 from vision3d.lines.settings import NO_LINE, LineReading, LineSettings
+from vision3d.lines.two_rows import TwoRows, read_two_rows
 from vision3d.lines.vanishing import VanishingPoint, vanishing_points
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "LineSettings",
     "Scene",
     "SegmentSettings",
+    "TwoRows",
     "VanishingPoint",
     "draw_lane",
     "draw_line",
@@ -37,5 +39,6 @@ __all__ = [
     "planar_pose",
     "plane_homography",
     "read_scene",
+    "read_two_rows",
     "vanishing_points",
 ]

@@ -1,6 +1,7 @@
 """Rendered truth: photographs of boards, markers, lines and scenes by a camera that is known exactly."""
 
 from vision3d.render.ground import GroundLine, RobotView, drive, line_pixels, random_line, render_ground
+from vision3d.render.ground_view import GroundView
 from vision3d.render.journeys import (
     forward_poses,
     looking_at,
@@ -33,6 +34,7 @@ from vision3d.render.video import RenderedFrame, moving_board, moving_markers, w
 __all__ = [
     "SCENES",
     "GroundLine",
+    "GroundView",
     "Material",
     "Plane",
     "RenderedFrame",

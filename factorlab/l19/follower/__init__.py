@@ -1,0 +1,25 @@
+"""The line follower of challenge D2, simulated end to end: a line, a camera, a detector, a filter, a PID."""
+
+from factorlab.l19.follower.curves import CURVES, Track, track
+from factorlab.l19.follower.drive import Drive, simulate
+from factorlab.l19.follower.follower import OFF_M, Follower, Reading, Step
+from factorlab.l19.follower.robot import CAMERA, MOUNT, PERIOD_S
+from factorlab.l19.follower.settings import DETECTORS, LIMITS, FollowerSettings
+
+__all__ = [
+    "CAMERA",
+    "CURVES",
+    "DETECTORS",
+    "LIMITS",
+    "MOUNT",
+    "OFF_M",
+    "PERIOD_S",
+    "Drive",
+    "Follower",
+    "FollowerSettings",
+    "Reading",
+    "Step",
+    "Track",
+    "simulate",
+    "track",
+]
