@@ -31,13 +31,33 @@ def claim(item, quantity, value, unit="", *, low=None, high=None, source="simulÃ
     """
     value = float(value)
     row = {"item": item, "quantity": quantity, "value": value, "unit": unit, "low": low, "high": high}
-    path = out_folder() / f"{script_name()}.jsonl"
-    with path.open("a" if path in _begun else "w", encoding="utf-8") as file:
-        file.write(json.dumps(row | {"source": source}, ensure_ascii=False) + "\n")
-    _begun.add(path)
+    _keep(row | {"source": source})
     say(f"{item} : {quantity} = {value:.4g}{' ' if unit else ''}{unit}{_said(low, high)}")
     assert low is None or value >= low, french(f"{quantity} : {value:.4g} {unit}, au moins {low:g} attendu")
     assert high is None or value <= high, french(f"{quantity} : {value:.4g} {unit}, au plus {high:g} attendu")
+
+
+def table(title, headings, rows):
+    """Keep a table for RESULTATS.md: what is told beside the claims, and not judged.
+
+    Parameters
+    ----------
+    title : str
+        What it shows, in French.
+    headings : sequence
+        A name, or a name and a unit, for each column.
+    rows : sequence of sequences
+        Words, numbers, or None for a dash.
+    """
+    cells = [[c if c is None or isinstance(c, str) else float(c) for c in row] for row in rows]
+    _keep({"title": title, "headings": list(headings), "rows": cells})
+
+
+def _keep(row):
+    path = out_folder() / f"{script_name()}.jsonl"
+    with path.open("a" if path in _begun else "w", encoding="utf-8") as file:
+        file.write(json.dumps(row, ensure_ascii=False) + "\n")
+    _begun.add(path)
 
 
 def _said(low, high):

@@ -2,9 +2,14 @@
 
 import click
 
+from factorlab.cli.l19_rapport import rapport
+
 __all__ = ["l19"]
 
 
 @click.group(short_help="The course L19, « Perception » (in French).")
 def l19() -> None:
     """Le cours L19, « Perception » : exercices, défis, robot suiveur de ligne, compte rendu."""
+
+
+l19.add_command(rapport)

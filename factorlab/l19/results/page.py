@@ -1,0 +1,172 @@
+"""RESULTATS.md as text: the course item by item, then every figure under the file that claims it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from factorlab.l19.results.claims import Claim
+from factorlab.l19.results.course import COURSE, PICTURED, part_of
+from factorlab.l19.results.numbers import band_text, number_text
+from factorlab.l19.results.running import Outcome
+from factorlab.report.document import Table
+from factorlab.report.words import number
+
+__all__ = ["CLAIM_HEADINGS", "Work", "cells", "results_page", "verdict_of"]
+
+CLAIM_HEADINGS = ("grandeur", "valeur", "tolérance", "mesuré sur", "verdict")
+GOOD, BAD, TOLD, FAILED, MISSING, SILENT = "bon", "HORS TOLÉRANCE", "dit", "ÉCHEC", "PAS DE FICHIER", "MUET"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Work:
+    """What a page is made of.
+
+    Attributes
+    ----------
+    outcomes : of the scripts that ran, in the order of the course
+    pictures : by script stem, paths as the page links to them
+    name : whose work it is; empty for the project's own
+    recordings : the student's own files, by the id of the item that read them
+    whole : whether every item of the course was asked for, so that a missing file is a fault
+    command : as it can be typed again
+    """
+
+    outcomes: Sequence[Outcome]
+    pictures: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    name: str = ""
+    recordings: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    whole: bool = True
+    command: str = ""
+
+    @property
+    def missing(self) -> list[str]:
+        """Ids that no script is for."""
+        there = {one.item for one in self.outcomes}
+        return [item.id for item in COURSE if self.whole and item.id not in there]
+
+    @property
+    def failed(self) -> bool:
+        """Whether an example failed, said nothing or left its band, or an id has no file."""
+        return bool(self.missing) or not all(one.good for one in self.outcomes)
+
+
+def results_page(work: Work) -> str:
+    """The whole page, in French."""
+    lines = [*_head(work), "", *_overview(work), ""]
+    titles = {item.id: item.title for item in COURSE}
+    practical = [one for one in work.outcomes if part_of(one.item) in PICTURED]
+    for item in dict.fromkeys(one.item for one in practical):
+        lines += [f"## {item}. {titles[item]}", ""]
+        for one in practical:
+            if one.item == item:
+                lines += _section(one, work.pictures.get(one.script.stem, ()))
+    rest = [one for one in work.outcomes if part_of(one.item) not in PICTURED]
+    if rest:
+        lines += ["## Cours, pièges, exercices et fiches", ""]
+        for one in rest:
+            lines += _section(one, ())
+    return "\n".join([*lines, *_times(work.outcomes)]).rstrip() + "\n"
+
+
+def _head(work: Work) -> list[str]:
+    judged = [claim for one in work.outcomes for claim in one.claims if claim.judged]
+    good = sum(claim.holds for claim in judged)
+    lines = [f"# Résultats du module L19, « Perception »{f' : {work.name}' if work.name else ''}", ""]
+    if work.recordings:
+        lines.append("Enregistrements personnels :\n")
+        lines += [
+            f"- {item} : {', '.join(f'`{f}`' for f in files)}" for item, files in work.recordings.items()
+        ]
+        lines.append("")
+    scripts = "exemple a tourné" if len(work.outcomes) == 1 else "exemples ont tourné"
+    lines.append(
+        f"{len(work.outcomes)} {scripts} ; {good} grandeurs sur {len(judged)} sont dans la tolérance que "
+        "leur exemple annonce, bornes comprises.  « Mesuré sur » dit d'où vient la grandeur : d'une "
+        "simulation, ou de l'enregistrement réel nommé.  Les temps, qui dépendent de la machine, sont à la "
+        "fin et ne sont pas jugés."
+    )
+    if work.command:
+        lines += ["", f"Page écrite par `{work.command}` ; ne pas la corriger à la main."]
+    return lines
+
+
+def _overview(work: Work) -> Iterable[str]:
+    yield "## Le cours, point par point"
+    yield ""
+    yield from table_lines(("", "fichier", *CLAIM_HEADINGS))
+    missing = set(work.missing)
+    for item in COURSE:
+        for one in work.outcomes:
+            if one.item == item.id:
+                yield _row((f"**{item.id}**", f"`{one.script.name}`", *_headline(one)))
+        if item.id in missing:
+            yield _row((f"**{item.id}**", "–", item.title, "–", "–", "–", MISSING))
+
+
+def _headline(outcome: Outcome) -> tuple[str, ...]:
+    claim = outcome.headline
+    if claim is None:
+        words = outcome.fault or "aucune grandeur annoncée"
+        return (words, "–", "–", "–", FAILED if outcome.fault else SILENT)
+    found = cells(claim)
+    if outcome.fault:
+        return (*found[:-1], FAILED)
+    return found if all(c.holds for c in outcome.claims) else (*found[:-1], BAD)
+
+
+def cells(claim: Claim) -> tuple[str, ...]:
+    """A claim under `CLAIM_HEADINGS`."""
+    unit = f" {claim.unit}" if claim.unit else ""
+    band = band_text(claim.low, claim.high)
+    return (claim.quantity, number_text(claim.value) + unit, band, claim.source, verdict_of(claim))
+
+
+def verdict_of(claim: Claim) -> str:
+    """In its band, out of it, or told without one."""
+    if not claim.judged:
+        return TOLD
+    return GOOD if claim.holds else BAD
+
+
+def _section(outcome: Outcome, pictures: Sequence[str]) -> list[str]:
+    lines = [f"### {outcome.script.name}", ""]
+    if outcome.fault:
+        lines += [f"**{FAILED}** : {outcome.fault}", ""]
+    claims = [claim for claim in outcome.claims if not claim.is_time]
+    if claims:
+        lines += [*table_lines(CLAIM_HEADINGS), *(_row(cells(claim)) for claim in claims), ""]
+    for table in outcome.tables:
+        lines += [f"{table.caption} :", "", *_table(table), ""]
+    return lines + [line for path in pictures for line in (f"![Figure de {outcome.script.stem}]({path})", "")]
+
+
+def _table(table: Table) -> Iterable[str]:
+    names = [h if isinstance(h, str) else f"{h[0]} ({h[1]})" for h in table.headings]
+    right = [any(isinstance(row[k], int | float) for row in table.rows) for k in range(len(names))]
+    yield from table_lines(names, right)
+    for row in table.rows:
+        yield _row([c if isinstance(c, str) else number(None) if c is None else number_text(c) for c in row])
+
+
+def _times(outcomes: Sequence[Outcome]) -> Iterable[str]:
+    rows = [(one.script.name, claim) for one in outcomes for claim in one.claims if claim.is_time]
+    if not rows:
+        return
+    yield "## Temps et vitesses"
+    yield ""
+    yield "Ils dépendent de la machine : dits, pas jugés."
+    yield ""
+    yield from table_lines(("fichier", "grandeur", "valeur"))
+    for name, claim in rows:
+        yield _row((f"`{name}`", *cells(claim)[:2]))
+
+
+def table_lines(headings: Sequence[str], right: Sequence[bool] = ()) -> list[str]:
+    """The two first lines of a table."""
+    sides = ["--:" if k < len(right) and right[k] else "---" for k in range(len(headings))]
+    return [_row(headings), "|" + "|".join(sides) + "|"]
+
+
+def _row(given: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in given) + " |"
