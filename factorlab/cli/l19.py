@@ -3,6 +3,7 @@
 import click
 
 from factorlab.cli.l19_rapport import rapport
+from factorlab.cli.l19_suiveur import suiveur
 
 __all__ = ["l19"]
 
@@ -13,3 +14,4 @@ def l19() -> None:
 
 
 l19.add_command(rapport)
+l19.add_command(suiveur)

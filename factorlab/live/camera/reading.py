@@ -9,7 +9,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Column", "Dots", "Label", "Line", "Mark", "Number", "Reading", "Role", "State", "Table", "plain"]
+from factorlab.live.plain import plain
+
+__all__ = ["Column", "Dots", "Label", "Line", "Mark", "Number", "Reading", "Role", "State", "Table"]
 
 State = Literal["good", "warn", "bad", "idle"]
 Role = Literal["good", "warn", "bad", "accent", "soft", "x", "y", "z"]
@@ -119,18 +121,3 @@ class Reading:
             "notes": list(self.notes),
             "panel": plain(self.panel),
         }
-
-
-def plain(value: Any) -> Any:
-    """The value as JSON knows it: lists for arrays, None for what is not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

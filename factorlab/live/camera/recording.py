@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from factorlab.live.camera.reader import Captured
-from factorlab.live.camera.reading import Reading, plain
+from factorlab.live.camera.reading import Reading
+from factorlab.live.plain import plain
 from factorlab.live.rows import GrowingFile
 from sequential.errors import DataError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
-from factorlab.live.camera.reading import plain
+from factorlab.live.plain import plain
 
 if TYPE_CHECKING:
     from factorlab.live.camera.session import CameraSession, Shown
