@@ -131,7 +131,7 @@ def _steps(options: dict[str, Any]) -> int | None:
     if options["steps"] is not None and options["duree"] is not None:
         raise click.UsageError("--steps et --duree disent la même chose : n'en donnez qu'une")
     if options["duree"] is not None:
-        return max(1, round(options["duree"] / PERIOD_S))
+        return max(1, round(float(options["duree"]) / PERIOD_S))
     if options["vite"] and options["steps"] is None:
         raise click.UsageError("--vite demande une fin : ajoutez --steps ou --duree")
     return None if options["steps"] is None else int(options["steps"])

@@ -2,7 +2,11 @@
 
 import { element } from "/elements.js";
 
-export const french = (value, digits) => value.toFixed(digits).replace(".", ",").replace("-", "−");
+// 1.5 as « 1,5 »; what rounds to zero has no sign
+export function french(value, digits) {
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace(".", ",").replace("-", "−");
+}
 
 export class Controls {
   constructor(place, list, change) {
@@ -56,7 +60,7 @@ export class Controls {
     }
   }
 
-  // What differs between two settings, in words: « Kp 18,0 → 24,0 ».
+  // What differs between two settings, as the second has it: « Kp 24,0 ».
   apart(before, after) {
     const parts = [];
     for (const { one } of this.inputs.values()) {

@@ -99,7 +99,7 @@ function write(id, text) {
 }
 
 function showChoices({ settings, pace, paused }) {
-  for (const [id, value] of [["curve", settings.curve], ["pace", String(pace)], ["seed", String(settings.seed)]])
+  for (const [id, value] of [["curve", settings.curve], ["detector", settings.detector], ["pace", String(pace)], ["seed", String(settings.seed)]])
     if (document.activeElement !== at(id) && at(id).value !== value) at(id).value = value;
   write("pause", paused ? "Reprendre" : "Pause");
   at("pause").disabled = over || state.ended;
@@ -207,6 +207,7 @@ function press(id) {
 function listen() {
   for (const id of ["pause", "restart", "reseed", "defaults", "zoom"]) at(id).addEventListener("click", () => press(id));
   at("curve").addEventListener("change", () => send({ do: "set", settings: { curve: at("curve").value } }));
+  at("detector").addEventListener("change", () => send({ do: "set", settings: { detector: at("detector").value } }));
   at("pace").addEventListener("change", () => send({ do: "pace", pace: Number(at("pace").value) }));
   at("seed").addEventListener("change", () => send({ do: "set", settings: { seed: Number(at("seed").value) } }));
   at("controls").addEventListener("submit", (event) => event.preventDefault());
@@ -231,6 +232,7 @@ addEventListener("load", async () => {
   setup = await (await fetch("/setup.json")).json();
   controls = new Controls(at("controls"), setup.controls, (settings) => send({ do: "set", settings }));
   at("curve").replaceChildren(...Object.entries(setup.curves).map(([name, title]) => element("option", { value: name }, `${name} : ${title}`)));
+  at("detector").replaceChildren(...Object.entries(setup.detectors).map(([name, title]) => element("option", { value: name }, title)));
   at("pace").replaceChildren(...setup.paces.map((pace) => element("option", { value: String(pace) }, `× ${String(pace).replace(".", ",")}`)));
   listen();
   const events = new EventSource("/events");
