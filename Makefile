@@ -26,13 +26,14 @@ pip_install = if [ -x $(BIN)/pip ]; then $(BIN)/python -m pip install $(PIP_FLAG
 	else $(PYTHON) -m pip --python $(BIN)/python install $(PIP_FLAGS) $(1); fi
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-opencv4 packages check bench warm clean
+.PHONY: help demo test test-opencv4 packages check docs bench warm clean
 
 help:
 	@echo "make demo    install, then compare filters and smoothers on a real drive; ends with the report's path"
 	@echo "make test    install everything, then run the whole suite"
 	@echo "make test-opencv4  tests of images and cameras once more, on OpenCV 4"
 	@echo "make check   lint, format, types and import contracts"
+	@echo "make docs    pictures, results of the course and pages; opens from build/site/index.html"
 	@echo "make bench   every benchmark, and the slow tests with all their seeds"
 	@echo "make clean   remove .venv, builds and caches"
 
@@ -57,6 +58,10 @@ check: $(VENV)/installed-test
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(VENV)/installed-test
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "open $(CURDIR)/build/site/index.html"
 
 # Each script saves its JSON document and, when it misses a "must", exits 3: all run, then the whole fails.
 bench: $(VENV)/installed-test warm
