@@ -2,6 +2,7 @@
 
 import click
 
+from factorlab.cli.l19_check import check
 from factorlab.cli.l19_defi import defi
 from factorlab.cli.l19_rapport import rapport
 from factorlab.cli.l19_suiveur import suiveur
@@ -14,6 +15,7 @@ def l19() -> None:
     """Le cours L19, « Perception » : exercices, défis, robot suiveur de ligne, compte rendu."""
 
 
+l19.add_command(check)
 l19.add_command(defi)
 l19.add_command(rapport)
 l19.add_command(suiveur)

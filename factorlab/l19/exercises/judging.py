@@ -1,0 +1,31 @@
+"""The job in the student's process: each exercise of the file, check after check."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from factorlab.l19.exercises.calling import Caller
+from factorlab.l19.exercises.finding import Sheet
+
+__all__ = ["ROOMS", "judge"]
+
+PLAIN_S, COMPILED_S = 3.0, 25.0  # what one call may take
+ROOMS = {
+    "E1": "factorlab.l19.exercises.e1_kalman",
+    "E2": "factorlab.l19.exercises.e2_median",
+    "E3": "factorlab.l19.exercises.e3_infrared",
+    "E4": "factorlab.l19.exercises.e4_components",
+}
+
+
+def judge(names: Mapping[str, Any], arguments: Mapping[str, Any], emit: Callable[[Any], None]) -> None:
+    """Run the checks of arguments["exercises"] on the names of a file; every finding leaves at once."""
+    compiled = {"numba", "sequential", "vision3d"} & set(sys.modules)  # compiles at its first call
+    call = Caller(Path(arguments["path"]), limit_s=COMPILED_S if compiled else PLAIN_S)
+    for exercise in arguments["exercises"]:
+        room = importlib.import_module(ROOMS[exercise])
+        room.check(Sheet(exercise, names, call, emit))
