@@ -18,7 +18,7 @@ lent.  Déclarer un R trop petit fait l'inverse, et le rend trop sûr de lui.
 
 import numpy as np
 from claims import claim
-from figures import BLUE, GREEN, ORANGE, READINGS, TRUTH, panels, save
+from figures import BLUE, GREEN, ORANGE, READINGS, TRUTH, panels, save, say
 
 import sequential as sq
 
@@ -65,7 +65,7 @@ def main():
     runs, told = {}, {}
     for name, (q, noise) in settings.items():
         runs[name], told[name] = judge(q, noise, drive)
-        print("{:9}: erreur {rms:.2f} m pour {announced:.2f} m annoncés ; dans ±2σ : {inside:.0f} % ; "
+        say("{:9}: erreur {rms:.2f} m pour {announced:.2f} m annoncés ; dans ±2σ : {inside:.0f} % ; "
               "NIS {nis:.1f} ; innovations corrélées à {echo:+.2f}".format(name, **told[name]))  # fmt: skip
 
     small_r, small_q, right = (told[name] for name in settings)

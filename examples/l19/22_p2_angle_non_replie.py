@@ -12,7 +12,7 @@ le sud envoie le cap faire un tour dans le mauvais sens, et le biais estimé du 
 
 import numpy as np
 from claims import claim
-from figures import GREEN, ORANGE, READINGS, TRUTH, panels, save
+from figures import GREEN, ORANGE, READINGS, TRUTH, panels, save, say
 
 DT, GYRO_SIGMA, COMPASS_SIGMA = 0.01, np.radians(1.0), np.radians(3.0)
 BIAS, TURN = np.radians(2.0), np.radians(20.0)  # rad/s : le biais vrai, et la vitesse de rotation
@@ -56,9 +56,7 @@ def main():
     bias = {name: np.degrees(path[-1, 1]) for name, (path, _) in runs.items()}
     headings = np.radians([359.0, 1.0])
     mean = np.degrees(np.angle(np.mean(np.exp(1j * headings))))
-    print(
-        f"moyenne de 359° et de 1° : {np.degrees(headings.mean()):.0f}° (nombres), {abs(mean):.0f}° (angles)"
-    )
+    say(f"moyenne de 359° et de 1° : {np.degrees(headings.mean()):.0f}° (nombres), {abs(mean):.0f}° (angles)")
 
     claim("P2", "erreur de cap, innovation repliée", rms["repliée"], "°", high=1.0)
     claim("P2", "erreur de cap, innovation non repliée", rms["non repliée"], "°", low=10)

@@ -17,7 +17,7 @@ Deux remèdes :
 
 import numpy as np
 from claims import claim
-from figures import BLUE, GREEN, ORANGE, PINK, panels, save
+from figures import BLUE, GREEN, ORANGE, PINK, panels, save, say
 
 import sequential as sq
 
@@ -95,13 +95,13 @@ def main():
     counts = np.array([1, 2, 4, 8, 16, 32])
     naive, joint, true = many_sensors(rng, counts)
     for n, *row in zip(counts, naive, joint, true, strict=True):
-        print(
+        say(
             "{:2d} capteurs : annoncé {:.3f} °C (indépendants), {:.3f} °C (jointe) ; vrai {:.3f} °C".format(
                 n, *row
             )
         )
     fused, nees = two_positions(rng)
-    print("deux GPS, NEES par composante (1 attendu) :", ", ".join(f"{n} {v:.2f}" for n, v in nees.items()))
+    say("deux GPS, NEES par composante (1 attendu) :", ", ".join(f"{n} {v:.2f}" for n, v in nees.items()))
 
     claim(
         "P3",
@@ -136,7 +136,7 @@ def draw(counts, naive, joint, true, fused, nees):
     a.axhline(COMMON, color="black", linewidth=0.8, linestyle=":", label="part commune σc")
     a.set(title="N thermomètres de la même carte", xlabel="nombre de capteurs", ylabel="écart-type (°C)")
     a.set_xticks(counts, [str(n) for n in counts])
-    a.set_yticks([0.1, 0.2, 0.3, 0.4, 0.5], ["0,1", "0,2", "0,3", "0,4", "0,5"])
+    a.set_yticks([0.1, 0.2, 0.3, 0.4, 0.5], ["0.1", "0.2", "0.3", "0.4", "0.5"])
     a.minorticks_off()
     colours = dict(zip(fused, (ORANGE, GREEN, BLUE), strict=True))
     b.plot(

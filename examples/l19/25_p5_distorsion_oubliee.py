@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from claims import claim
-from figures import BLUE, GREEN, ORANGE, panels, save
+from figures import BLUE, GREEN, ORANGE, panels, save, say
 
 from vision3d.boards import Checkerboard
 from vision3d.calibrate import calibrate
@@ -81,11 +81,9 @@ def main():
     raw = np.array([measure(view.pixels) for view in tests])
     mended = np.array([measure(straight(found.camera, view.pixels)) for view in tests])
     bends = [(bend_px(view.pixels), bend_px(straight(found.camera, view.pixels))) for view in tests]
-    print(
-        f"{len(views[::2])} images pour étalonner (résidu {found.rms_px:.2f} px), {len(tests)} pour mesurer"
-    )
+    say(f"{len(views[::2])} images pour étalonner (résidu {found.rms_px:.2f} px), {len(tests)} pour mesurer")
     for view, (before, after) in zip(tests, bends, strict=True):
-        print(f"  {view.name} : une rangée s'écarte d'une droite de {before:.1f} px, puis {after:.1f} px")
+        say(f"  {view.name} : une rangée s'écarte d'une droite de {before:.1f} px, puis {after:.1f} px")
 
     worst = {
         name: np.linalg.norm(e, axis=2).max(axis=1) for name, e in (("oubliée", raw), ("corrigée", mended))

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from claims import claim
-from figures import BLUE, GREEN, ORANGE, panels, save
+from figures import BLUE, GREEN, ORANGE, panels, save, say
 
 import sequential as sq
-from factorlab.l19.sheets import in_plain_text, read_sheet, verified
+from factorlab.l19.sheets import as_text, read_sheet, verified
 from sequential.manifold import SO3
 from vision3d.camera import Camera
 
@@ -179,10 +179,8 @@ CHECKS = {
 
 def main():
     sheet = read_sheet(SHEET)
-    print(f"{sheet.title}\n\n{in_plain_text(sheet.introduction)}\n")
-    found = dict(verified(sheet, CHECKS))
-    for entry in sheet.entries:
-        print(f"{entry.title}\n{in_plain_text(entry.text)}\n  → {found[entry.title]}\n")
+    found = verified(sheet, CHECKS)
+    say(as_text(sheet, found))
     claim("S1", "définitions vérifiées par le calcul", len(found), low=16, high=16)
     growth = drift_growth()
     claim("S1", "dérive après quatre fois plus de temps", growth, "fois", low=1.7, high=2.3)

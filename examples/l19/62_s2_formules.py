@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 from claims import claim
-from figures import BLUE, GREEN, ORANGE, panels, save
+from figures import BLUE, GREEN, ORANGE, panels, save, say
 from scipy.stats import chi2
 
 import sequential as sq
-from factorlab.l19.sheets import in_plain_text, read_sheet, verified
+from factorlab.l19.sheets import as_text, read_sheet, verified
 from sequential.sensors import allan_deviation
 from vision3d.camera import Camera
 from vision3d.image import sobel
@@ -236,10 +236,8 @@ CHECKS = {
 
 def main():
     sheet = read_sheet(SHEET)
-    print(f"{sheet.title}\n\n{in_plain_text(sheet.introduction)}\n")
-    found = dict(verified(sheet, CHECKS))
-    for entry in sheet.entries:
-        print(f"{entry.title}\n{in_plain_text(entry.text)}\n  → {found[entry.title]}\n")
+    found = verified(sheet, CHECKS)
+    say(as_text(sheet, found))
     claim("S2", "formules vérifiées numériquement", len(found), low=19, high=19)
     tau = sq.LowPass(coefficient=0.05, interval=0.02).tau
     claim("S2", "constante de temps du passe-bas a = 0,05 à 50 Hz", tau, "s", low=0.38, high=0.42)
@@ -252,9 +250,7 @@ def draw():
     t = np.linspace(0, 2.0, 200)
     for share, colour in ((0.02, BLUE), (0.05, GREEN), (0.2, ORANGE)):
         tau = -0.02 / np.log(1 - share)
-        a.plot(
-            t, 1 - np.exp(-t / tau), color=colour, label=f"a = {share:g} : τ = {tau:.2f} s".replace(".", ",")
-        )
+        a.plot(t, 1 - np.exp(-t / tau), color=colour, label=f"a = {share:g} : τ = {tau:.2f} s")
     a.set(title="Passe-bas à 50 Hz : l'échelon", xlabel="temps (s)", ylabel="sortie")
     ratio = np.logspace(-2, 2, 100)
     b.semilogx(ratio, 1 / (1 + ratio), color=BLUE, label="K = P/(P + R)")

@@ -1,8 +1,8 @@
 """The course's sheets: Markdown that a student reads, and a script that checks what it says.
 
 sheet = read_sheet("examples/l19/fiches/s1_definitions.md")
-for title, found in verified(sheet, {"Bruit": noise, "Biais": bias}):
-    print(title, found)
+found = verified(sheet, {"Bruit": noise, "Biais": bias})
+print(as_text(sheet, found))
 
 A sheet has one title (`# `), an introduction, and entries (`## `).  Every entry links to the example that
 shows it, and has a check of the same name: a function that asserts what the entry says and returns in a
@@ -19,7 +19,7 @@ from pathlib import Path
 
 from sequential.errors import DataError, FileFormatError
 
-__all__ = ["Entry", "Sheet", "in_plain_text", "read_sheet", "verified"]
+__all__ = ["Entry", "Sheet", "as_text", "in_plain_text", "read_sheet", "verified"]
 
 LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
 WEB = ("http://", "https://", "#")
@@ -89,8 +89,8 @@ def read_sheet(path: Path | str) -> Sheet:
     return Sheet(path, title[2:].strip(), introduction.strip(), entries)
 
 
-def verified(sheet: Sheet, checks: Mapping[str, Callable[[], str]]) -> list[tuple[str, str]]:
-    """Run every entry's check: (title, what it found), in reading order.
+def verified(sheet: Sheet, checks: Mapping[str, Callable[[], str]]) -> dict[str, str]:
+    """Run every entry's check: what it found, by the entry's title, in reading order.
 
     Raises
     ------
@@ -105,7 +105,13 @@ def verified(sheet: Sheet, checks: Mapping[str, Callable[[], str]]) -> list[tupl
         near = get_close_matches(stray[0], sheet.titles, n=1)
         meant = f"; did you mean {near[0]!r}?" if near else ""
         raise DataError(f"{sheet.path.name} has no entry {stray[0]!r} to check{meant}")
-    return [(title, checks[title]()) for title in sheet.titles]
+    return {title: checks[title]() for title in sheet.titles}
+
+
+def as_text(sheet: Sheet, found: Mapping[str, str]) -> str:
+    """The whole sheet as a terminal shows it, under each entry what its check found."""
+    entries = [f"{one.title}\n{in_plain_text(one.text)}\n  → {found[one.title]}" for one in sheet.entries]
+    return "\n\n".join([sheet.title, in_plain_text(sheet.introduction), *entries])
 
 
 def in_plain_text(markdown: str) -> str:

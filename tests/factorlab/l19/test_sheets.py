@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from factorlab.l19.sheets import in_plain_text, read_sheet, verified
+from factorlab.l19.sheets import as_text, in_plain_text, read_sheet, verified
 from sequential.errors import DataError, FileFormatError
 
 FOLDER = Path(__file__).resolve().parents[3] / "examples" / "l19" / "fiches"
@@ -62,7 +62,9 @@ def test_a_missing_sheet_is_named(tmp_path):
 def test_every_entry_is_checked_and_every_check_has_an_entry(write):
     sheet = read_sheet(write(GOOD))
     checks = {"Biais": lambda: "3", "Bruit": lambda: "1"}
-    assert verified(sheet, checks) == [("Bruit", "1"), ("Biais", "3")]
+    found = verified(sheet, checks)
+    assert list(found.items()) == [("Bruit", "1"), ("Biais", "3")]
+    assert "Le biais : exemple.py.\n  → 3" in as_text(sheet, found)
     with pytest.raises(DataError, match="nothing checks the entry 'Biais'"):
         verified(sheet, {"Bruit": checks["Bruit"]})
     with pytest.raises(DataError, match="no entry 'Biaix' to check; did you mean 'Biais'"):
