@@ -101,7 +101,8 @@ def main():
             )
         )
     fused, nees = two_positions(rng)
-    say("deux GPS, NEES par composante (1 attendu) :", ", ".join(f"{n} {v:.2f}" for n, v in nees.items()))
+    told = ", ".join(f"{n} {v:.2f}" for n, v in nees.items())
+    say(f"deux GPS, NEES par composante (1 attendu) : {told}")
 
     claim(
         "P3",
