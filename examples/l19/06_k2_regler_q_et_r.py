@@ -125,7 +125,7 @@ def draw_gate(b, log, truth, gated, fixed):
     b.set_xlim(30, 70)
     inside = (s > 30) & (s < 70)
     b.axvspan(40, 48, color="#eeeeee", label="capteur muet")
-    b.set_ylim(truth[inside].min() - 25, truth[inside].max() + 35)
+    b.set_ylim(truth[inside].min() - 25, truth[inside].max() + 15)
     b.legend(loc="lower left", fontsize=8)
 
 

@@ -2,22 +2,27 @@
 
 Flouter, dériver, seuiller, nettoyer, compter : chaque opération lit un pixel et ses voisins.
 
-- Convolution : chaque pixel devient une somme pondérée de ses voisins. Un flou gaussien divise l'écart-type
-  d'un bruit blanc par 1/√(Σ k²). Il est séparable : deux passes de n poids au lieu de n².
-- Gradient (Sobel) : une dérivée lissée. Sa longueur dit s'il y a un bord, sa direction où l'image s'éclaire.
-- Seuil d'Otsu : le niveau qui sépare le mieux deux classes, celui où q₁q₂(μ₁ - μ₂)² est maximal. Un seul
+- Convolution : chaque pixel devient une somme pondérée de ses voisins.  Un flou gaussien multiplie
+  l'écart-type d'un bruit blanc par Σ k² (k : les poids d'une passe).  Il est séparable : deux passes de n
+  poids, et non une de n².
+- Gradient (Sobel) : une dérivée lissée.  Sa longueur dit s'il y a un bord, sa direction où l'image s'éclaire.
+- Seuil d'Otsu : le niveau qui sépare le mieux deux classes, celui où q₁q₂(μ₁ - μ₂)² est maximal.  Un seul
   niveau suppose un seul éclairage ; le seuil adaptatif compare chaque pixel à la moyenne de son voisinage.
-- Ouverture (érosion puis dilatation) : ôte les grains ; fermeture : bouche les trous.
+- Érosion : un pixel reste si tous ses voisins sont là ; dilatation : il apparaît si l'un d'eux est là.
+  Ouverture (érosion puis dilatation) : ôte les grains ; fermeture (l'inverse) : bouche les trous.
 - Composantes connexes par parcours en largeur (BFS) : combien d'objets, de quelle aire, où.
 
 Les trois écritures d'une opération (`backend="numpy"`, à lire ; `"compiled"`, rapide ; `"opencv"`) donnent
-la même matrice. Avec FACTORLAB_DATA, une vraie photo de bonbons s'ajoute à l'image dessinée.
+la même matrice.  Avec FACTORLAB_DATA, une vraie photo de bonbons s'ajoute à l'image dessinée.
 """
 
 import os
 from pathlib import Path
 
+import figures
 import numpy as np
+from claims import claim
+from figures import BLUE, GREEN, ORANGE, say
 
 from vision3d.image import (
     adaptive_threshold,
@@ -35,169 +40,153 @@ from vision3d.image import (
     threshold,
 )
 
-SIGMA_BRUIT = 22.0  # niveaux
-DISQUES = [(60, 60, 26), (150, 50, 20), (250, 70, 30), (70, 170, 22), (165, 160, 34), (265, 175, 24)]
+NOISE_SIGMA = 22.0  # niveaux
+DISCS = [(60, 60, 26), (150, 50, 20), (250, 70, 30), (70, 170, 22), (165, 160, 34), (265, 175, 24)]
+GREY = {"cmap": "gray", "vmin": 0, "vmax": 255}
 
 
-def scene(rng, gradient_de_lumiere=0.0):
+def scene(rng, dimming=0.0):
     """Six disques clairs sur fond sombre, du bruit, et la lumière qui baisse vers la droite."""
     y, x = np.mgrid[:240, :320]
-    disques = np.zeros(x.shape, bool)
-    for cx, cy, r in DISQUES:
-        disques |= np.hypot(x - cx, y - cy) < r
-    lumiere = 1.0 - gradient_de_lumiere * x / x.shape[1]
-    image = np.where(disques, 170.0, 75.0) * lumiere + SIGMA_BRUIT * rng.standard_normal(x.shape)
-    return np.clip(np.rint(image), 0, 255).astype(np.uint8), disques
+    inside = np.zeros(x.shape, bool)
+    for cx, cy, r in DISCS:
+        inside |= np.hypot(x - cx, y - cy) < r
+    light = 1.0 - dimming * x / x.shape[1]
+    image = np.where(inside, 170.0, 75.0) * light + NOISE_SIGMA * rng.standard_normal(x.shape)
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8), inside
 
 
 def photo():
     """La photo de bonbons en gris, ou None sans FACTORLAB_DATA."""
     from vision3d.images import read_image
 
-    path = Path(os.environ.get("FACTORLAB_DATA", "")) / "vision/opencv/smarties.png"
+    path = Path(os.environ.get("FACTORLAB_DATA") or "nowhere") / "vision/opencv/smarties.png"
     return grey(read_image(path, colour=True)) if path.is_file() else None
 
 
-def compter(image, *, clair):
+def count(image, *, bright):
     """Seuil d'Otsu, nettoyage, composantes d'au moins 100 pixels."""
-    masque = threshold(image, otsu(image), rule="binary" if clair else "binary_inv")
-    disque = structuring_element(5, "ellipse")
-    propre = closing(opening(masque, disque), disque)
-    pieces = connected_components(propre, method="breadth-first")
-    return masque, pieces, np.flatnonzero(pieces.areas >= 100)
+    mask = threshold(image, otsu(image), rule="binary" if bright else "binary_inv")
+    disc = structuring_element(5, "ellipse")
+    pieces = connected_components(closing(opening(mask, disc), disc), method="breadth-first")
+    return pieces, np.flatnonzero(pieces.areas >= 100)
 
 
-def memes_pixels(image):
-    """Si NumPy, la boucle compilée et OpenCV rendent la même matrice."""
+def differing_pixels(image):
+    """Nombre de pixels où NumPy, la boucle compilée et OpenCV ne rendent pas la même chose."""
     taps = [[1, 2, 1], [2, 4, 2], [1, 2, 1]]
-    flous = [convolve(image, taps, dtype=np.int16, backend=b) for b in ("numpy", "compiled", "opencv")]
-    bords = [sobel(image, 1, 0, backend=b) for b in ("numpy", "compiled", "opencv")]
-    return all(np.array_equal(trio[0], autre) for trio in (flous, bords) for autre in trio[1:])
+    ways = ("numpy", "compiled", "opencv")
+    blurs = [convolve(image, taps, dtype=np.int16, backend=way) for way in ways]
+    edges = [sobel(image, 1, 0, backend=way) for way in ways]
+    return sum(np.sum(three[0] != other) for three in (blurs, edges) for other in three[1:])
 
 
-def erreur_de_direction(pente, disque):
-    """Écart efficace, en degrés, entre le gradient au bord d'un disque clair et le chemin vers son centre."""
-    cx, cy, r = disque
+def direction_error(slope, disc):
+    """Écart RMS, en degrés, entre le gradient au bord d'un disque clair et le chemin vers son centre."""
+    cx, cy, r = disc
     angle = np.radians(np.arange(0, 360, 3))
     u, v = np.rint(cx + r * np.cos(angle)).astype(int), np.rint(cy + r * np.sin(angle)).astype(int)
-    ecart = np.angle(np.exp(1j * (pente.direction_rad[v, u] - angle - np.pi)))
-    return np.degrees(np.sqrt(np.mean(ecart**2)))
+    off = np.angle(np.exp(1j * (slope.direction_rad[v, u] - angle - np.pi)))
+    return np.degrees(np.sqrt(np.mean(off**2)))
 
 
-def variance_entre_classes(image):
+def variance_between_classes(image):
     """q₁q₂(μ₁ - μ₂)² de chaque niveau, par la définition."""
-    entre = np.zeros(256)
-    for niveau in range(256):
-        basse, haute = image[image <= niveau], image[image > niveau]
-        if len(basse) and len(haute):
-            part = len(basse) / image.size
-            entre[niveau] = part * (1 - part) * (basse.mean() - haute.mean()) ** 2
-    return entre
+    between = np.zeros(256)
+    for level in range(256):
+        low, high = image[image <= level], image[image > level]
+        if len(low) and len(high):
+            share = len(low) / image.size
+            between[level] = share * (1 - share) * (low.mean() - high.mean()) ** 2
+    return between
 
 
-def dessiner_seuil(axes, image, entre, niveau):
-    from figures import BLUE, ORANGE
-
-    comptes = np.bincount(image.ravel(), minlength=256)
-    axes.fill_between(np.arange(256), comptes, color="#bbbbbb", label="pixels par niveau")
-    axes.plot(entre / entre.max() * comptes.max(), color=BLUE, label="q₁q₂(μ₁ - μ₂)²")
-    axes.axvline(niveau, color=ORANGE, label=f"Otsu : {niveau}")
-    axes.set(title="histogramme et seuil", xlabel="niveau", xlim=(20, 220), ylim=(0, 1.45 * comptes.max()))
+def draw_levels(axes, image, between, level):
+    """L'histogramme, et ce qu'Otsu maximise."""
+    counts = np.bincount(image.ravel(), minlength=256)
+    axes.fill_between(np.arange(256), counts, color="#bbbbbb", label="pixels par niveau")
+    axes.plot(between / between.max() * counts.max(), color=BLUE, label="q₁q₂(μ₁ − μ₂)²")
+    axes.axvline(level, color=ORANGE, label=f"Otsu : {level}")
+    axes.set(title="Histogramme et seuil", xlabel="niveau de gris", ylabel="pixels", xlim=(20, 220))
+    axes.set_ylim(0, 1.5 * counts.max())
     axes.legend(loc="upper right")
 
 
-def dessiner_pieces(axes, pieces, gardees):
-    axes.imshow(np.ma.masked_equal(pieces.labels, 0), cmap="tab10", vmin=0, vmax=9, interpolation="nearest")
-    axes.plot(*pieces.centroids[gardees].T, "k+", markersize=9)
-    axes.set(title=f"flou, seuil, ouverture : {len(gardees)} objets")
-
-
-def dessiner_lumiere(axes, image, adaptatif):
-    from figures import GREEN, ORANGE
-
-    axes.imshow(image, cmap="gray", vmin=0, vmax=255)
+def draw_light(axes, image, adaptive):
+    """Les deux seuils sous une lumière inégale."""
+    axes.imshow(image, **GREY)
     axes.contour(threshold(image, "otsu"), levels=[128], colors=[ORANGE], linewidths=1.2)
-    axes.contour(adaptatif, levels=[128], colors=[GREEN], linewidths=1.2)
-    axes.set(title="lumière inégale : Otsu orange, adaptatif vert")
+    axes.contour(adaptive, levels=[128], colors=[GREEN], linewidths=1.2)
+    axes.set(title="Lumière inégale : Otsu orange,\nadaptatif vert")
 
 
-def dessiner_photo(axes, image, adaptatif):
-    from figures import ORANGE
-
+def draw_photo(axes, image, adaptive):
+    """La vraie photo et ses objets ; sans elle, le seuil adaptatif."""
     if image is None:
-        axes.imshow(adaptatif, cmap="gray", vmin=0, vmax=255)
-        axes.set(title="le seuil adaptatif")
+        axes.imshow(adaptive, **GREY)
+        axes.set(title="Le seuil adaptatif")
         return
-    _, bonbons, gros = compter(gaussian_blur(image, 1.8), clair=False)
-    axes.imshow(image, cmap="gray", vmin=0, vmax=255)
-    axes.plot(*bonbons.centroids[gros].T, "+", color=ORANGE, markersize=9, markeredgewidth=1.8)
-    axes.set(title=f"photo : {len(gros)} objets sombres")
-    print(f"photo de bonbons : {len(gros)} objets sombres (des bonbons qui se touchent n'en font qu'un)")
+    sweets, large = count(gaussian_blur(image, 1.8), bright=False)
+    axes.imshow(image, **GREY)
+    axes.plot(*sweets.centroids[large].T, "+", color=ORANGE, markersize=9, markeredgewidth=1.8)
+    axes.set(title=f"Photo : {len(large)} objets sombres")
+    say(f"photo de bonbons : {len(large)} objets sombres (des bonbons qui se touchent n'en font qu'un)")
 
 
 def main():
-    from figures import panels, save
-
     rng = np.random.default_rng(19)
-    image, vrais = scene(rng)
-    print(f"une matrice {image.shape} de {image.dtype} ; image[60, 60] = {image[60, 60]}")
-    egales = memes_pixels(image)
-    print(f"trois écritures, mêmes pixels : {'oui' if egales else 'non'}")
+    image, true = scene(rng)
+    say(f"une matrice {image.shape} de {image.dtype} ; image[60, 60] = {image[60, 60]}")
+    blurred = gaussian_blur(image, 1.8, size=11)
+    background = np.s_[205:236, 90:220]  # sans disque
+    predicted = NOISE_SIGMA * np.sum(gaussian_kernel(11, 1.8) ** 2)  # deux passes : (√Σ k²)²
+    slopes = [gradient(image), gradient(blurred)]
+    raw_error, error = (direction_error(slope, DISCS[4]) for slope in slopes)
+    level, between = otsu(blurred), variance_between_classes(blurred)
+    pieces, kept = count(blurred, bright=True)
+    uncleaned = connected_components(threshold(image, otsu(image)))
+    dimmed = gaussian_blur(scene(rng, dimming=0.75)[0], 1.8, size=11)
+    adaptive = adaptive_threshold(dimmed, 101, -6)
+    right = [100 * np.mean((mask > 0) == true) for mask in (threshold(dimmed, "otsu"), adaptive)]
 
-    flou = gaussian_blur(image, 1.8, size=11)
-    fond = np.s_[205:236, 90:220]  # sans disque
-    prevu = SIGMA_BRUIT * np.sum(gaussian_kernel(11, 1.8) ** 2)  # Σ des poids 2-D au carré : (Σ k²)²
-    mesure = flou[fond].std()
-    print(f"bruit du fond : {image[fond].std():.2f} niveaux ; flou : {mesure:.2f}, prévu {prevu:.2f}")
-
-    pentes = {"brute": gradient(image), "floue": gradient(flou)}
-    erreurs = {nom: erreur_de_direction(pente, DISQUES[4]) for nom, pente in pentes.items()}
-    for nom, erreur in erreurs.items():
-        print(f"direction du gradient au bord, image {nom} : à {erreur:.0f}° près")
-
-    niveau, entre = otsu(flou), variance_entre_classes(flou)
-    _, pieces, gardees = compter(flou, clair=True)
-    brut = connected_components(threshold(image, otsu(image)))
-    print(f"Otsu : {niveau} ; composantes : {len(brut)} sans nettoyage, {len(gardees)} après")
-
-    penchee = gaussian_blur(scene(rng, gradient_de_lumiere=0.75)[0], 1.8, size=11)
-    adaptatif = adaptive_threshold(penchee, 101, -6)
-    masques = {"Otsu": threshold(penchee, "otsu"), "adaptatif": adaptatif}
-    juste = {nom: np.mean((masque > 0) == vrais) for nom, masque in masques.items()}
-    for nom, part in juste.items():
-        print(f"lumière qui baisse de 75 % : {100 * part:.1f} % de pixels justes, seuil {nom}")
-
-    figure, axes = panels(2, 4, size=(13.0, 6.0), title="V1. Une image est une matrice")
-    gris = {"cmap": "gray", "vmin": 0, "vmax": 255}
-    seuil_seul = f"seuil sans flou : {len(brut)} composantes"
-    montrees = {
-        0: (image, "l'image, bruitée"),
-        1: (flou, "flou gaussien, σ = 1,8 px"),
-        4: (threshold(image, otsu(image)), seuil_seul),
-    }
-    for k, (montree, titre) in montrees.items():
-        axes[k].imshow(montree, **gris)
-        axes[k].set(title=titre)
-    axes[2].imshow(pentes["floue"].magnitude, cmap="gray")
-    axes[2].set(title="longueur du gradient (Sobel)")
-    dessiner_seuil(axes[3], flou, entre, niveau)
-    dessiner_pieces(axes[5], pieces, gardees)
-    dessiner_lumiere(axes[6], penchee, adaptatif)
-    dessiner_photo(axes[7], photo(), adaptatif)
+    figure, axes = figures.panels(2, 4, size=(13.0, 6.2), title="V1. Une image est une matrice")
+    axes[0].imshow(image, **GREY)
+    axes[0].set(title="L'image, bruitée")
+    axes[1].imshow(blurred, **GREY)
+    axes[1].set(title="Flou gaussien, σ = 1,8 px")
+    axes[2].imshow(slopes[1].magnitude, cmap="gray")
+    axes[2].set(title="Longueur du gradient (Sobel)")
+    draw_levels(axes[3], blurred, between, level)
+    axes[4].imshow(threshold(image, otsu(image)), **GREY)
+    axes[4].set(title=f"Seuil sans flou :\n{len(uncleaned)} composantes")
+    axes[5].imshow(
+        np.ma.masked_equal(pieces.labels, 0), cmap="tab10", vmin=0, vmax=9, interpolation="nearest"
+    )
+    axes[5].plot(*pieces.centroids[kept].T, "k+", markersize=9)
+    axes[5].set(title=f"Flou, seuil, ouverture, fermeture :\n{len(kept)} objets")
+    draw_light(axes[6], dimmed, adaptive)
+    draw_photo(axes[7], photo(), adaptive)
     for k in (0, 1, 2, 4, 5, 6, 7):
         axes[k].axis("off")
-    save(figure)
+    figures.save(figure)
 
-    assert egales, "NumPy, la boucle compilée et OpenCV donnent les mêmes pixels"
-    assert abs(mesure / prevu - 1) < 0.15, "le flou ôte au bruit ce que disent ses poids"
-    assert erreurs["floue"] < 0.5 * erreurs["brute"], "un gradient se prend sur une image lissée"
-    assert int(np.argmax(entre)) == niveau, "Otsu : le meilleur de tous les niveaux"
-    assert len(gardees) == len(DISQUES), "chaque disque est un objet, et il n'y en a pas d'autre"
-    places = np.array([d[:2] for d in DISQUES])
-    distances = np.linalg.norm(pieces.centroids[gardees][:, None] - places, axis=2).min(axis=1)
-    assert distances.max() < 0.5, "les centres sont trouvés au demi-pixel"
-    assert len(brut) > 3 * len(DISQUES), "sans nettoyage, le bruit compte pour des objets"
-    assert juste["adaptatif"] > 0.97 > juste["Otsu"], "un seul niveau ne suit pas la lumière"
+    claim("V1", "objets trouvés (six dessinés)", len(kept), low=6, high=6)
+    places = np.array([disc[:2] for disc in DISCS])
+    away = np.linalg.norm(pieces.centroids[kept][:, None] - places, axis=2).min(axis=1)
+    claim("V1", "erreur de leurs centres, au pire", away.max(), "px", high=0.5)
+    claim("V1", "pixels où NumPy, la boucle compilée et OpenCV diffèrent", differing_pixels(image), high=0)
+    claim(
+        "V1",
+        "bruit après le flou, mesuré sur prévu",
+        blurred[background].std() / predicted,
+        low=0.85,
+        high=1.15,
+    )
+    claim("V1", "pixels justes sous lumière inégale, seuil d'Otsu", right[0], "%", high=96)
+    claim("V1", "pixels justes sous lumière inégale, seuil adaptatif", right[1], "%", low=97)
+    assert error < 0.5 * raw_error, "un gradient se prend sur une image lissée"
+    assert int(np.argmax(between)) == level, "Otsu : le meilleur de tous les niveaux"
+    assert len(uncleaned) > 3 * len(DISCS), "sans nettoyage, le bruit compte pour des objets"
 
 
 if __name__ == "__main__":
