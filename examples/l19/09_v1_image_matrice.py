@@ -107,7 +107,7 @@ def draw_levels(axes, image, between, level):
     axes.fill_between(np.arange(256), counts, color="#bbbbbb", label="pixels par niveau")
     axes.plot(between / between.max() * counts.max(), color=BLUE, label="q₁q₂(μ₁ − μ₂)²")
     axes.axvline(level, color=ORANGE, label=f"Otsu : {level}")
-    axes.set(title="Histogramme et seuil", xlabel="niveau de gris", ylabel="pixels", xlim=(20, 220))
+    axes.set(title="Histogramme et seuil", xlabel="niveau de gris", ylabel="pixels", xlim=(20, 290))
     axes.set_ylim(0, 1.5 * counts.max())
     axes.legend(loc="upper right")
 
