@@ -82,7 +82,8 @@ def follow(ground, rng):
 
 
 def main():
-    from figures import panels, save
+    from claims import claim
+    from figures import panels, save, say
 
     rng = np.random.default_rng(4)
     straight = GroundLine(np.array([[-1.0, 0.0], [3.0, 0.0]]), 0.03)
@@ -92,9 +93,9 @@ def main():
     single = image <= otsu(image)
     bottom, middle, offset, heading = by_hand(image)
     reading = find_line(image)
-    print(f"Otsu seul : {100 * single.mean():.0f} % de l'image serait la ligne")
-    print(f"à la main : décalage {offset:+.3f}, cap {heading:+.1f}°")
-    print(
+    say(f"Otsu seul : {100 * single.mean():.0f} % de l'image serait la ligne")
+    say(f"à la main : décalage {offset:+.3f}, cap {heading:+.1f}°")
+    say(
         f"find_line : décalage {reading.offset:+.3f}, cap {np.degrees(reading.heading_rad):+.1f}°, "
         f"confiance {reading.confidence:.2f}"
     )
@@ -103,15 +104,14 @@ def main():
     metres = ground.read(reading)
     true, true_heading = straight.seen_from(pose, metres.near[0])
     sigma = np.sqrt(np.diag(metres.cov))
-    print(
+    say(
         f"au sol, à {100 * metres.near[0]:.0f} cm : {1000 * metres.offset_m:+.1f} ± {1000 * sigma[0]:.1f} mm "
         f"(vrai {1000 * true:+.1f}), cap {np.degrees(metres.heading_rad):+.1f} ± {np.degrees(sigma[1]):.1f}° "
         f"(vrai {np.degrees(true_heading):+.1f})"
     )
     path = follow(ground, rng)
     rms = np.sqrt(np.mean((path[:, 1] - path[:, 2]) ** 2))
-    print(f"en route : {len(path)} images, erreur RMS {1000 * rms:.1f} mm")
-    building()
+    say(f"en route : {len(path)} images, erreur RMS {1000 * rms:.1f} mm")
 
     figure, axes = panels(2, 3, size=(13.0, 7.4), title="TP4 (c). Suivre une ligne")
     for ax, shown, title in (
@@ -128,12 +128,25 @@ def main():
     draw_path(axes[5], path)
     save(figure)
 
-    assert single.mean() > 0.25, "un seul seuil échoue dans l'ombre"
-    assert abs(offset - reading.offset) < 0.05, "à la main ou suivie, la ligne est la même"
-    assert abs(metres.offset_m - true) < 4 * sigma[0] + 1e-3, "et l'homographie la met à sa place"
+    claim("TP4c", "en route, au sol : erreur RMS du décalage", 1e3 * rms, "mm", high=2.0)
+    claim(
+        "TP4c",
+        "Otsu seul : part de l'image prise pour la ligne",
+        100 * single.mean(),
+        "%",
+        low=25.0,
+    )
+    claim("TP4c", "à la main et find_line : écart du décalage", abs(offset - reading.offset), high=0.05)
+    claim(
+        "TP4c",
+        "décalage au sol : erreur en σ annoncés",
+        abs(metres.offset_m - true) / sigma[0],
+        "σ",
+        high=4.0,
+    )
     assert abs(metres.heading_rad - true_heading) < 4 * sigma[1] + 0.01
-    assert rms < 4e-3
     assert not find_line(np.full((240, 320), 120, np.uint8)).found, "sans ligne, elle le dit"
+    building()
 
 
 def above(ground, image, reading):
@@ -144,6 +157,8 @@ def above(ground, image, reading):
 
 def building():
     """La photo d'un immeuble n'a pas de ligne à suivre."""
+    from claims import claim
+
     photo = Path(os.environ.get("FACTORLAB_DATA") or "nowhere") / "vision/opencv/building.jpg"
     if not photo.is_file():
         return
@@ -151,7 +166,13 @@ def building():
     reading, scene = find_line(image), read_scene(image)
     seen = f"{len(scene.segments)} segments, {len(scene.points)} points de fuite"
     print(f"immeuble : {'une' if reading.found else 'pas de'} ligne à suivre ; {seen}")
-    assert not reading.found
+    claim(
+        "TP4c",
+        "lignes à suivre trouvées sur la photo d'un immeuble",
+        reading.found,
+        high=0,
+        source="photo OpenCV",
+    )
     assert scene.built
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -146,4 +147,5 @@ def _surroundings() -> dict[str, str]:
 def _fault(stderr: str, code: int) -> str:
     """The last line of what it said, which is the exception's."""
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
-    return lines[-1].removeprefix("AssertionError: ") if lines else f"s'est arrêté avec le code {code}"
+    # "AssertionError: …", "sequential.errors.DataError: …": the sentence is what a student needs
+    return re.sub(r"^[\w.]+Error: ", "", lines[-1]) if lines else f"s'est arrêté avec le code {code}"
