@@ -59,8 +59,8 @@ def main():
     print("K =", good.camera.matrix.round(2), sep="\n")
     pose = next_pose(poor, BOARD)
     x, y = pose.outline_px.mean(axis=0)
-    say(f"prochaine pose utile aux quatre images : damier vers ({x:.0f}, {y:.0f}) px, à {pose.distance_m:.2f} m, "
-        f"penché de {np.degrees(pose.tilt_rad):.0f}°")  # fmt: skip
+    say(f"prochaine pose utile aux quatre images : damier vers ({x:.0f}, {y:.0f}) px, "
+        f"à {pose.distance_m:.2f} m, penché de {np.degrees(pose.tilt_rad):.0f}°")  # fmt: skip
     real, source = photos()
 
     figure, axes = panels(2, 2, size=(12.0, 9.0), title="TP4 (a). Calibration par damier")

@@ -39,5 +39,5 @@ def test_files_of_one_s_own(tmp_path, rng):
     assert (tmp_path / "out" / "49_tp5_vision_imu.png").is_file()
     found = done.stdout.split("biais trouvé [")[1].split("]")[0]
     bias = np.degrees(truth.gyro_bias[-1])
-    np.testing.assert_allclose(np.array(found.split(), dtype=float), bias, atol=0.6)
+    np.testing.assert_allclose(np.array(found.replace(",", ".").split(), dtype=float), bias, atol=0.6)
     assert f"{len(images)} images lues" in done.stdout
