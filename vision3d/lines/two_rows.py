@@ -17,7 +17,7 @@ from vision3d.lines.settings import LineReading, no_line
 
 __all__ = ["TwoRows", "read_two_rows"]
 
-SOFT = 1.5  # px over which an edge rises
+SOFT = 2.0  # px over which an edge rises: the pixel's own width, and as much for tilt and focus
 FLOOR = 0.06  # px that a centre is never better known than
 SURE = 2.0  # times the least contrast, from which on the reading is sure
 

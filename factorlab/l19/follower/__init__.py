@@ -2,9 +2,11 @@
 
 from factorlab.l19.follower.curves import CURVES, Track, track
 from factorlab.l19.follower.drive import Drive, simulate
+from factorlab.l19.follower.film import write_film
 from factorlab.l19.follower.follower import OFF_M, Follower, Reading, Step
 from factorlab.l19.follower.robot import CAMERA, MOUNT, PERIOD_S
 from factorlab.l19.follower.settings import DETECTORS, LIMITS, FollowerSettings
+from factorlab.l19.follower.sweep import Sweep, sweep
 
 __all__ = [
     "CAMERA",
@@ -19,7 +21,10 @@ __all__ = [
     "FollowerSettings",
     "Reading",
     "Step",
+    "Sweep",
     "Track",
     "simulate",
+    "sweep",
     "track",
+    "write_film",
 ]

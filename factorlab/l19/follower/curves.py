@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -17,7 +19,7 @@ Array = NDArray[np.float64]
 WIDTH_M = 0.02
 STEP_M = 0.01  # between points
 LENGTH_M = 16.0  # along x, of those that are not closed
-NEAR_M = 0.6  # how far along the line from the last place the next one is looked for
+PADDING = 60  # points, how far along the line from the last place the next one is looked for
 
 
 def _sine(x: Array, amplitude_m: float, wave_m: float) -> Array:
@@ -67,14 +69,10 @@ class Track:
     Attributes
     ----------
     line : the stripe that the camera sees
-    lengths : (N,) m along it
-    headings : (N,) rad of its direction, without jumps
     closed : whether its end is its beginning
     """
 
     line: GroundLine
-    lengths: Array
-    headings: Array
     closed: bool
 
     @property
@@ -85,51 +83,64 @@ class Track:
     @property
     def length_m(self) -> float:
         """From its beginning to its end."""
-        return float(self.lengths[-1])
+        return float(self.line.lengths[-1])
+
+    @cached_property
+    def table(self) -> Array:
+        """(M, 4) x m, y m, direction rad without jumps, arc length m; a closed line goes on at both ends."""
+        along = np.gradient(self.points, axis=0)
+        if self.closed:
+            along[0] = along[-1] = self.points[1] - self.points[-2]
+        headings = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+        whole = np.column_stack([self.points, headings, self.line.lengths])
+        if not self.closed:
+            return whole
+        round_once = np.array([0.0, 0.0, headings[-1] - headings[0], self.length_m])
+        return np.vstack([whole[-PADDING - 1 : -1] - round_once, whole, whole[1 : PADDING + 1] + round_once])
 
     def at(self, s_m: float) -> Array:
         """(3,) place and direction at an arc length."""
-        s = s_m % self.length_m if self.closed else s_m
-        columns = (self.points[:, 0], self.points[:, 1], self.headings)
-        return np.array([np.interp(s, self.lengths, column) for column in columns])
-
-    def around(self, s_m: float) -> NDArray[np.int64]:
-        """Indices of the points within `NEAR_M` along the line."""
-        middle, half = round(s_m / STEP_M), round(NEAR_M / STEP_M)
-        count = len(self.lengths) - 1
-        window = np.arange(middle - half, middle + half + 1)
-        return window % count if self.closed else window[(window >= 0) & (window <= count)]
+        return np.array([np.interp(self._wrapped(s_m), self.table[:, 3], self.table[:, k]) for k in range(3)])
 
     def nearest(self, place: Array, s_m: float) -> tuple[float, float]:
         """Arc length of the nearest point near `s_m`, and how far to its left the place is, m."""
-        near = self.around(s_m)
-        away = place[:2] - self.points[near]
-        k = int(near[np.argmin(np.einsum("ij,ij->i", away, away))])
-        c, s = np.cos(self.headings[k]), np.sin(self.headings[k])
-        dx, dy = place[:2] - self.points[k]
-        return float(self.lengths[k] + c * dx + s * dy), float(c * dy - s * dx)
+        near = self._near(s_m)
+        dx, dy = place[0] - near[:, 0], place[1] - near[:, 1]
+        k = int(np.argmin(dx * dx + dy * dy))
+        c, s = math.cos(near[k, 2]), math.sin(near[k, 2])
+        length = float(near[k, 3] + c * dx[k] + s * dy[k])
+        return self._wrapped(length), float(c * dy[k] - s * dx[k])
 
-    def crossing(self, pose: Array, ahead_m: float, s_m: float) -> Array | None:
-        """(3,) where the line crosses what lies `ahead_m` in front of a robot, to its left and right.
+    def crossings(self, pose: Array, ahead_m: Array, s_m: float) -> Array | None:
+        """(k, 3) where the line crosses what lies `ahead_m` (k,) in front of a robot, to its left and right.
 
-        Place and direction in the world; of several crossings the one nearest to the robot's axis, None
-        where there is none near `s_m`, the robot's own arc length.
+        Places and directions in the world; of several crossings the one nearest to the robot's axis.  None
+        where one of them is not there near `s_m`, the robot's own arc length.
         """
-        near = self.around(s_m + ahead_m)
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        away = self.points[near] - pose[:2]
-        x = c * away[:, 0] + s * away[:, 1] - ahead_m
-        found = np.flatnonzero((x[:-1] <= 0.0) & (x[1:] > 0.0))
-        if not len(found):
-            return None
-        y = c * away[found, 1] - s * away[found, 0]
-        k = int(found[np.argmin(np.abs(y))])
-        share = -x[k] / (x[k + 1] - x[k])
-        first, second = near[k], near[k + 1]
-        place = self.points[first] + share * (self.points[second] - self.points[first])
-        turn = self.headings[second] - self.headings[first]
-        turn -= 2 * np.pi * np.round(turn / (2 * np.pi))  # where a closed line begins anew
-        return np.array([place[0], place[1], self.headings[first] + share * turn])
+        near = self._near(s_m)
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        dx, dy = near[:, 0] - pose[0], near[:, 1] - pose[1]
+        x = c * dx + s * dy
+        out = np.empty((len(ahead_m), 3))
+        for row, ahead in zip(out, ahead_m.tolist(), strict=True):
+            before = x <= ahead
+            found = np.flatnonzero(before[:-1] > before[1:])
+            if not len(found):
+                return None
+            k = found[0]
+            if len(found) > 1:
+                k = found[np.argmin(np.abs(c * dy[found] - s * dx[found]))]
+            row[:] = near[k, :3] + (ahead - x[k]) / (x[k + 1] - x[k]) * (near[k + 1, :3] - near[k, :3])
+        return out
+
+    def _wrapped(self, s_m: float) -> float:
+        return s_m % self.length_m if self.closed else s_m
+
+    def _near(self, s_m: float) -> Array:
+        """The rows of the table within `PADDING` along the line."""
+        middle = round(self._wrapped(s_m) / STEP_M) + (PADDING if self.closed else 0)
+        last = len(self.table) - 2  # two rows at least
+        return self.table[min(max(middle - PADDING, 0), last) : max(middle + PADDING + 1, 2)]
 
 
 def track(name: str, seed: int = 0) -> Track:
@@ -139,14 +150,7 @@ def track(name: str, seed: int = 0) -> Track:
     else:
         x = np.arange(-0.5, LENGTH_M, 0.002)
         points = np.column_stack([x, GRAPHS[name](x, np.random.default_rng([seed, 19]))])
-    points = _evenly(points, closed=closed)
-    along = np.gradient(points, axis=0)
-    if closed:
-        along[0] = along[-1] = points[1] - points[-2]
-    headings = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    lengths = np.concatenate([[0.0], np.cumsum(steps)])
-    return Track(GroundLine(points, WIDTH_M), lengths, headings, closed)
+    return Track(GroundLine(_evenly(points, closed=closed), WIDTH_M), closed)
 
 
 def _loop() -> Array:

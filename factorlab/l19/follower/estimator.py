@@ -88,10 +88,8 @@ class Localiser:
 
     def context(self, pose: Array, s_m: float, ahead: Array) -> Array | None:
         """(8,) the map where both rows should show it; None where it is not in front."""
-        crossings = [self.track.crossing(pose, float(one), s_m) for one in ahead]
-        if crossings[0] is None or crossings[1] is None:
-            return None
-        return np.array([ahead[0], *crossings[0], ahead[1], *crossings[1]])
+        crossings = self.track.crossings(pose, ahead, s_m)
+        return None if crossings is None else np.column_stack([ahead, crossings]).ravel()
 
     def expected(self, pose: Array, s_m: float, ahead: Array) -> Array | None:
         """(2,) how far to the left the line should be; None where it is not in front."""

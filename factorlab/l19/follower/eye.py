@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factorlab.l19.follower.curves import WIDTH_M
-from factorlab.l19.follower.robot import CAMERA, along_arc, ground
+from factorlab.l19.follower.robot import CAMERA, ground
 from vision3d.lines import LineReading, TwoRows, find_line, read_two_rows
 from vision3d.lines.settings import no_line
 
@@ -103,14 +103,11 @@ def by_threshold(image: Image) -> LineReading:
     )
 
 
-def sight(reading: LineReading, age_s: float, speed_m_s: float, rate_rad_s: float) -> Sighting:
-    """A reading that was found, in metres; `age_s` is how long ago the middle of the exposure was."""
+def sight(reading: LineReading, moved: Array) -> Sighting:
+    """A reading that was found, in metres; `moved` (3,) is the way since the exposure's middle."""
     pixels = np.array([reading.bottom_px, reading.middle_px])
     places, per_pixel = on_ground(pixels[:, 0], pixels[:, 1])
-    if age_s > 0.0:
-        # the ground comes towards a robot that drives on
-        moved = along_arc(np.zeros(3), speed_m_s * age_s, rate_rad_s * age_s)
-        c, s = np.cos(moved[2]), np.sin(moved[2])
-        places = (places - moved[:2]) @ np.array([[c, -s], [s, c]])
+    c, s = np.cos(moved[2]), np.sin(moved[2])
+    places = (places - moved[:2]) @ np.array([[c, -s], [s, c]])
     variance = np.diagonal(reading.cov_px) * per_pixel**2 + FLOOR_M**2
     return Sighting(places[:, 0], places[:, 1], variance)

@@ -12,7 +12,7 @@ from factorlab.l19.follower.controller import Pid, PidMemory
 from factorlab.l19.follower.curves import track
 from factorlab.l19.follower.estimator import LOST_SIGMA, START_SIGMA, Localiser, mixed_rate
 from factorlab.l19.follower.eye import Sighting, aheads, read, sight
-from factorlab.l19.follower.robot import PERIOD_S, Drivetrain, along_arc, view
+from factorlab.l19.follower.robot import PERIOD_S, Drivetrain, along_arc, between, view
 from factorlab.l19.follower.settings import FollowerSettings
 from vision3d.lines import LineReading
 
@@ -24,7 +24,7 @@ OFF_M = 0.10  # from the line: it has left the image
 LIMIT_RAD_S = 4.0  # turn rate
 PATIENCE_S = 0.25  # that a robot without a map keeps its last command for
 AGREED = 3  # images in a row that show the line again
-REMEMBERED = 12  # periods that a shutter may reach back
+REMEMBERED = 22  # periods that a shutter may reach back
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +108,7 @@ class Follower:
         self.drivetrain, self.pid = Drivetrain(), PidMemory()
         self.past: deque[tuple[Array, Drivetrain]] = deque(maxlen=REMEMBERED)
         self.true_s = self.believed_s = start
+        self.trail = deque([self.odometry], maxlen=REMEMBERED)
         self.count, self.unseen, self.agreed = 0, 0, 0
         self.command, self.lost = (0.0, 0.0), False
 
@@ -161,8 +162,11 @@ class Follower:
 
     def _sighting(self, seen: LineReading) -> Sighting:
         """In metres, at the end of the exposure."""
-        age = 0.5 * min(self.settings.blur_s, self.count * PERIOD_S)
-        return sight(seen, age, self.drivetrain.speed_m_s, self.drivetrain.rate_rad_s)
+        age = 0.5 * self.settings.blur_s / PERIOD_S
+        whole = min(int(age), len(self.trail) - 1)
+        later = self.trail[-1 - whole]
+        before = self.trail[max(-2 - whole, -len(self.trail))]
+        return sight(seen, between(later + min(age - whole, 1.0) * (before - later), self.trail[-1]))
 
     def _believe(self, sighting: Sighting | None) -> bool:
         """Correct the estimate by what was seen; False where nothing was, or it does not fit the map."""
@@ -213,4 +217,5 @@ class Follower:
         self.belief = self.localiser.moved(self.belief, wheels, gyro)
         turned, _ = mixed_rate(wheels, gyro, own)
         self.odometry = along_arc(self.odometry, wheels.mean() * PERIOD_S, turned * PERIOD_S)
+        self.trail.append(self.odometry)
         self.count += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -12,7 +13,7 @@ from vision3d.camera import Camera
 from vision3d.lines import CameraMount, GroundHomography
 from vision3d.render.ground_view import GroundView
 
-__all__ = ["CAMERA", "MOUNT", "PERIOD_S", "TRACK_M", "Drivetrain", "along_arc", "ground", "view"]
+__all__ = ["CAMERA", "MOUNT", "PERIOD_S", "TRACK_M", "Drivetrain", "along_arc", "between", "ground", "view"]
 
 Array = NDArray[np.float64]
 PERIOD_S = 0.05  # of the camera and of the controller
@@ -38,14 +39,18 @@ def ground() -> GroundHomography:
 def along_arc(pose: Array, length_m: float, turn_rad: float) -> Array:
     """(3,) the pose after an arc of a circle."""
     half = 0.5 * turn_rad
-    chord = length_m * np.sinc(half / np.pi)
+    chord = length_m * (math.sin(half) / half if abs(half) > 1e-6 else 1.0)
+    angle = float(pose[2]) + half
     return np.array(
-        [
-            pose[0] + chord * np.cos(pose[2] + half),
-            pose[1] + chord * np.sin(pose[2] + half),
-            pose[2] + turn_rad,
-        ]
+        [pose[0] + chord * math.cos(angle), pose[1] + chord * math.sin(angle), pose[2] + turn_rad]
     )
+
+
+def between(first: Array, second: Array) -> Array:
+    """(3,) the second pose as seen from the first."""
+    c, s = math.cos(first[2]), math.sin(first[2])
+    dx, dy = second[0] - first[0], second[1] - first[1]
+    return np.array([c * dx + s * dy, c * dy - s * dx, second[2] - first[2]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +72,7 @@ class Drivetrain:
 
     def after(self, speed_m_s: float, rate_rad_s: float) -> Drivetrain:
         """Mean speeds over the next period, under a command."""
-        share = 1.0 - float(np.exp(-PERIOD_S / LAG_S))
+        share = 1.0 - math.exp(-PERIOD_S / LAG_S)
         aside = 0.5 * TRACK_M * rate_rad_s
         wanted = (min(max(speed_m_s + way * aside, -FASTEST), FASTEST) for way in (-1.0, 1.0))
         left, right = (

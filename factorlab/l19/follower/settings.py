@@ -13,7 +13,7 @@ DETECTORS = ("bands", "threshold", "find_line")
 LIMITS = {
     "speed_m_s": (0.0, 1.0),
     "noise": (0.0, 255.0),
-    "blur_s": (0.0, 0.5),
+    "blur_s": (0.0, 1.0),
     "kp": (0.0, 200.0),
     "ki": (0.0, 200.0),
     "kd": (0.0, 50.0),
