@@ -1,6 +1,8 @@
 """The names that the course prescribes, on whatever a checker may hand them."""
 
 import importlib.util
+import inspect
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,40 @@ def load(name):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+PRESCRIBED = {
+    "31_e1_kalman": ("Kalman.predire", "Kalman.corriger", "nis_moyen"),
+    "32_e2_median_et_sauts": ("median_glissant", "detecter_sauts"),
+    "33_e3_capteur_ir": ("ajuster", "distance", "incertitude_distance"),
+    "34_e4_composantes": ("composantes", "plus_gros_objet"),
+    "53_d3_demontrer_et_ukf": ("points_sigma",),
+}
+PARAMETERS = {
+    "Kalman": ("F", "B", "H", "Q", "R", "x0", "P0"),
+    "Kalman.predire": ("self", "u"),
+    "Kalman.corriger": ("self", "z"),
+    "nis_moyen": ("kf", "mesures", "commandes"),
+    "median_glissant": ("x", "k"),
+    "detecter_sauts": ("x", "k", "seuil"),
+    "ajuster": ("d", "v"),
+    "distance": ("v",),
+    "incertitude_distance": ("v",),
+    "composantes": ("masque",),
+    "plus_gros_objet": ("masque", "aire_min"),
+    "points_sigma": ("x", "P", "kappa"),
+}
+
+
+@pytest.mark.parametrize(
+    ("file", "name"), [(file, name) for file, names in PRESCRIBED.items() for name in names]
+)
+def test_prescribed_names_take_what_is_prescribed(file, name):
+    found = attrgetter(name)(load(file))
+    parameters = tuple(inspect.signature(found).parameters)
+    asked = PARAMETERS[name]
+    assert parameters[: len(asked)] == asked  # E3 lets one add what it needs after v
+    assert len(parameters) == len(asked) or name in {"distance", "incertitude_distance"}
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +132,58 @@ def test_jumps_are_found_and_little_else(e2, rng):
     found = e2.detecter_sauts(x, 21, 5.0)
     assert np.isin(at, found).all()
     assert len(found) - len(at) <= 5
+
+
+def moving_medians(x, k):
+    half = k // 2
+    return np.array([np.median(x[max(0, i - half) : i + half + 1]) for i in range(len(x))])
+
+
+@pytest.mark.parametrize("k", [1, 3, 5, 11, 25])
+def test_medians_are_the_naive_ones(e2, k, rng):
+    x = rng.standard_normal(60)
+    inside = slice(k // 2, len(x) - k // 2)  # the edges are a convention
+    np.testing.assert_array_equal(e2.median_glissant(x, k)[inside], moving_medians(x, k)[inside])
+
+
+def test_an_outlier_does_not_move_the_median_and_readings_stay_as_they_were(e2, rng):
+    x = rng.standard_normal(50)
+    spoilt = x.copy()
+    spoilt[20] = 1e6
+    kept = spoilt.copy()
+    assert np.abs(e2.median_glissant(spoilt, 9) - e2.median_glissant(x, 9)).max() < 3.0
+    assert 20 in e2.detecter_sauts(spoilt, 9, 5.0)
+    np.testing.assert_array_equal(spoilt, kept)
+
+
+@pytest.fixture(scope="module")
+def e3():
+    return load("33_e3_capteur_ir")
+
+
+def infrared(d, a=28.0, b=0.5, c=0.1):
+    return a / (np.asarray(d) + b) + c
+
+
+@pytest.mark.parametrize("kind", [list, np.array])
+def test_an_exact_table_gives_its_curve(e3, kind):
+    d = np.linspace(8.0, 80.0, 20)
+    curve = e3.ajuster(kind(d), kind(infrared(d)))
+    np.testing.assert_allclose([curve.a, curve.b, curve.c], [28.0, 0.5, 0.1], rtol=1e-6)
+    np.testing.assert_allclose(e3.distance(infrared(d), curve), d, rtol=1e-7)
+    assert e3.distance(float(infrared(25.0)), curve) == pytest.approx(25.0, rel=1e-7)
+    assert np.isnan(e3.distance(0.05, curve))  # below c: no distance reads that
+
+
+def test_the_sigma_of_a_distance_is_what_repeating_shows(e3, rng):
+    d, sigma_v = np.repeat(np.linspace(8.0, 80.0, 20), 20), 0.02
+    curve = e3.ajuster(d, infrared(d) + sigma_v * rng.standard_normal(len(d)))
+    for place in (10.0, 60.0):
+        found = e3.distance(infrared(place) + sigma_v * rng.standard_normal(4000), curve)
+        told = e3.incertitude_distance(float(infrared(place)), curve)
+        assert told == pytest.approx(found.std(), rel=0.15)
+    near, far = (e3.incertitude_distance(float(infrared(place)), curve) for place in (10.0, 60.0))
+    assert far / near == pytest.approx((60.5 / 10.5) ** 2, rel=0.15)  # sigma grows as (d + b)²
 
 
 @pytest.mark.parametrize("kappa", [0.0, 1.0, -1.0])
