@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +81,8 @@ def suiveur(**options: Any) -> int:
 
     require_output(options["out"], None, force=options["force"])
     steps = _steps(options)
-    session = FollowerSession(_settings(options), steps=steps, wait=not options["vite"])
+    with _patience():
+        session = FollowerSession(_settings(options), steps=steps, wait=not options["vite"])
     with stopping() as stop, ExitStack() as ending:
         ending.callback(session.close)
         server = FollowerServer(session, options["port"])
@@ -105,6 +109,18 @@ def suiveur(**options: Any) -> int:
     if session.fault:
         click.echo(f"error: {session.fault}", err=True)
     return DATA_ERROR if session.fault else code
+
+
+@contextmanager
+def _patience() -> Iterator[None]:
+    """Say what is going on where it takes longer than a moment."""
+    words = "préparation : la première fois, le calcul est compilé, ce qui prend une à deux minutes …"
+    notice = threading.Timer(2.0, click.echo, (words,), {"err": True})
+    notice.start()
+    try:
+        yield
+    finally:
+        notice.cancel()
 
 
 def _settings(options: dict[str, Any]) -> FollowerSettings:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factorlab.l19.follower import FollowerSettings, Step
+from factorlab.l19.follower import PERIOD_S, FollowerSettings, Step
 
 __all__ = ["COLUMNS", "SHOWN", "Journey", "row_of"]
 
@@ -46,6 +46,7 @@ class Journey:
     changes : how many times a setting was changed on the way
     lost_s : when the line was lost for the first time; None while it never was
     arrived : at the end of the line, or of the steps asked for
+    unseen_s : how long the estimate has had nothing from the camera
     """
 
     number: int
@@ -54,6 +55,7 @@ class Journey:
     changes: int = 0
     lost_s: float | None = None
     arrived: bool = False
+    unseen_s: float = 0.0
     _sum: float = 0.0
     _driven: int = 0
 
@@ -64,6 +66,7 @@ class Journey:
             self._driven += 1
         elif self.lost_s is None:
             self.lost_s = step.t_s
+        self.unseen_s = 0.0 if step.reading.used else self.unseen_s + PERIOD_S
         self.rows.append(row_of(step))
 
     @property

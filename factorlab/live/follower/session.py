@@ -18,7 +18,7 @@ __all__ = ["PACES", "FollowerSession"]
 
 LATE_S = 0.25  # a computer that is slower than the robot makes it drive more slowly
 KEPT = 8  # drives in the table
-LONGEST = 200_000  # steps of one drive, an hour or two
+LONGEST = 72_000  # steps of one drive: an hour of the robot
 PACES = (0.25, 1.0, 2.0, 5.0)
 
 
@@ -110,7 +110,7 @@ class FollowerSession:
                 self.journeys = [*self.journeys[1 - KEPT :], Journey(self.journey.number + 1, self.settings)]
             else:
                 self.journey.settings = self.settings
-            self.last = None
+            self.last, self.fault = None, ""
             self.ended.clear()
         self.pause(on=False)
 

@@ -50,7 +50,7 @@ def state_of(session: FollowerSession) -> dict[str, Any]:
         "pace": session.pace,
         "steps": session.steps,
         "fault": session.fault,
-        "step": None if step is None else _step(step),
+        "step": None if step is None else _step(step) | {"unseen_s": journey.unseen_s},
     }
 
 

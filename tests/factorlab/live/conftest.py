@@ -1,4 +1,4 @@
-"""Sessions over rendered videos."""
+"""Sessions over rendered videos, and of the line follower."""
 
 import contextlib
 
@@ -7,7 +7,9 @@ import pytest
 from chromium import Chromium
 from live_worlds import FPS, marker_image, write_video
 
+from factorlab.l19.follower import FollowerSettings
 from factorlab.live.camera import CameraSession, PageServer, TaskSettings, task_choices
+from factorlab.live.follower import FollowerServer, FollowerSession
 from vision3d.frames import open_frames
 
 
@@ -35,6 +37,26 @@ def live(tmp_path):
             begun.callback(session.close)
             server = PageServer(session, 0)
             begun.callback(server.close)
+            return session, server
+
+        yield begin
+
+
+@pytest.fixture
+def follower():
+    """Begin to follow a line, each time with a page; all end with the test."""
+    with contextlib.ExitStack() as begun:
+
+        def begin(*, pace=5.0, start=True, steps=None, wait=True, **settings):
+            session = FollowerSession(
+                FollowerSettings(**{"curve": "circuit"} | settings), steps=steps, wait=wait
+            )
+            session.pace = pace
+            begun.callback(session.close)
+            server = FollowerServer(session, 0)
+            begun.callback(server.close)
+            if start:
+                session.start()
             return session, server
 
         yield begin

@@ -8,6 +8,9 @@ export function french(value, digits) {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace(".", ",").replace("-", "−");
 }
 
+// A line must not break before « : ; ? ! », nor inside guillemets.
+export const bound = (text) => text.replace(/ ([:;?!»…%])/g, "\u00a0$1").replace(/« /g, "«\u00a0");
+
 export class Controls {
   constructor(place, list, change) {
     this.inputs = new Map();
@@ -32,7 +35,7 @@ export class Controls {
     });
     this.inputs.set(one.name, { one, input, output });
     return element("div", { class: "slider" }, element("label", { for: one.name }, one.title), output, input,
-      element("span", { class: "help", id: `${one.name}-help` }, one.help));
+      element("span", { class: "help", id: `${one.name}-help` }, bound(one.help)));
   }
 
   write(name, shown) {

@@ -1,6 +1,7 @@
 // The ground from above: the line, the way that was driven, the way that is believed, and the robot.
 
 const MARGIN = 18; // px
+const LONG_M = 4;
 
 export function colours(...names) {
   const style = getComputedStyle(document.documentElement);
@@ -60,10 +61,9 @@ export class GroundMap {
 
   view(width, height, step) {
     let [left, right, low, high] = bounds(this.line);
-    if (this.close && step) {
-      const [x, y] = step.pose;
-      [left, right, low, high] = [x - 0.4, x + 0.4, y - 0.25, y + 0.25];
-    }
+    const [x, y] = step ? step.pose : this.line[0];
+    if (this.close) [left, right, low, high] = [x - 0.4, x + 0.4, y - 0.25, y + 0.25];
+    else if (right - left > LONG_M) [left, right] = [x - 0.7 * LONG_M, x + 0.3 * LONG_M]; // a part of a long line
     const scale = Math.min((width - 2 * MARGIN) / (right - left), (height - 2 * MARGIN) / Math.max(high - low, 0.3));
     const [cx, cy] = [(left + right) / 2, (low + high) / 2];
     return { scale, x: (x) => width / 2 + scale * (x - cx), y: (y) => height / 2 - scale * (y - cy) };
@@ -80,9 +80,11 @@ export class GroundMap {
     pen.lineTo(-0.7 * size, 0.65 * size);
     pen.lineTo(-0.7 * size, -0.65 * size);
     pen.closePath();
-    pen.fillStyle = colour;
+    pen.fillStyle = pen.strokeStyle = colour;
+    pen.globalAlpha = size > 20 ? 0.3 : 1; // near by, what is believed shows through
     pen.fill();
     pen.restore();
+    pen.globalAlpha = 1;
   }
 
   // Where the filter believes the robot to be, in 99 cases of 100: three standard deviations.

@@ -1,11 +1,12 @@
 // The page of the line follower: what the robot does, and sliders that change it while it drives.
 
 import { element, fill } from "/elements.js";
-import { Controls, french } from "/controls.js";
+import { bound, Controls, french } from "/controls.js";
 import { GroundMap } from "/map.js";
 import { Strip } from "/strips.js";
 import { watchTheme } from "/theme.js";
 
+const MOST = 8000; // steps of the way that are drawn
 const at = (id) => document.getElementById(id);
 const map = new GroundMap(at("map"));
 const strips = [
@@ -20,6 +21,8 @@ let state = null;
 let way = [];
 let ghost = [];
 let wayOf = 0; // number of the drive that `way` is of
+let told = 0; // how many of its steps came
+let drawing = false;
 let lineOf = 0; // number of the line that the map has
 let over = false;
 
@@ -59,13 +62,26 @@ function hear(event) {
   }
   const next = JSON.parse(event.data);
   const { number, begin, rows } = next.way;
-  if (number !== wayOf) {
-    ghost = way;
-    way = [];
-    wayOf = number;
+  if (number !== wayOf || begin < told) {
+    if (number !== wayOf) ghost = way;
+    [way, wayOf, told] = [[], number, begin];
   }
-  if (begin <= way.length) way = [...way.slice(0, begin), ...rows];
+  way.push(...rows);
+  told += rows.length;
+  if (way.length > MOST) way.splice(0, way.length - MOST);
   show(next);
+}
+
+// Drawn when the screen is: a page that nobody looks at costs nothing.
+function draw() {
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    map.draw(way, ghost, state.step);
+    for (const strip of strips) strip.draw(way);
+    drawCamera(state.step);
+  });
 }
 
 async function show(next) {
@@ -79,9 +95,7 @@ async function show(next) {
   controls.show(next.settings);
   showChoices(next);
   showHeadline(next);
-  map.draw(way, ghost, step);
-  for (const strip of strips) strip.draw(way);
-  drawCamera(step);
+  draw();
   const cm = (value, digits = 1) => (value === null || value === undefined ? "–" : `${french(100 * value, digits)} cm`);
   write("time", step ? `${french(step.t_s, 1)} s` : "–");
   write("offset", cm(step?.offset_m));
@@ -91,10 +105,11 @@ async function show(next) {
   showAttempts(next);
   document.body.dataset.steps = journey.steps;
   document.body.dataset.journey = journey.number;
-  document.body.dataset.lost = String(journey.lost_s !== null);
+  document.body.dataset.lost = String(Boolean(step?.lost));
 }
 
-function write(id, text) {
+function write(id, words) {
+  const text = bound(words);
   if (at(id).textContent !== text) at(id).textContent = text;
 }
 
@@ -110,20 +125,21 @@ function showChoices({ settings, pace, paused }) {
 function showHeadline({ journey, step, paused, ended, fault }) {
   let [text, kind, advice] = ["Le robot suit la ligne", "good", ""];
   if (fault) [text, kind] = [fault, "bad"];
-  else if (journey.lost_s !== null) {
+  else if (step?.lost) {
     [text, kind] = [`Ligne perdue à ${french(journey.lost_s, 1)} s`, "bad"];
     advice = advise(state.settings);
   } else if (journey.arrived) [text, kind] = [`Arrivé : ${journey.steps} pas, écart RMS ${french(100 * journey.rms_m, 2)} cm`, "good"];
   else if (ended) [text, kind] = ["Terminé", "idle"];
   else if (paused) [text, kind] = ["En pause", "idle"];
-  else if (!step) [text, kind] = ["Prêt à partir", "idle"];
-  else if (!step.found) [text, kind] = ["La caméra ne voit pas la ligne : le robot continue d'après l'EKF", "warn"];
+  else if (!step) [text, kind] = ["Préparation …", "idle"];
+  else if (step.unseen_s > 0.3) [text, kind] = ["La caméra ne voit plus la ligne : le robot roule d'après l'EKF et sa carte", "warn"];
   else if (Math.abs(step.offset_m) > 0.04) [text, kind] = ["Le robot s'écarte de la ligne", "warn"];
+  else if (journey.lost_s !== null) text = `Le robot a retrouvé la ligne, perdue à ${french(journey.lost_s, 1)} s`;
   write("headline", text);
   at("headline").className = `headline ${kind}`;
   write("advice", advice);
   at("advice").hidden = !advice;
-  const badge = journey.lost_s !== null ? "ligne perdue" : paused ? "en pause" : "";
+  const badge = step?.lost ? "ligne perdue" : paused ? "en pause" : "";
   write("badge", badge);
   at("badge").hidden = !badge;
 }
@@ -137,7 +153,7 @@ function advise(settings) {
   if (kp < 4) tries.push("montez Kp : le robot ne tourne pas assez");
   if (kp > 35) tries.push("baissez Kp, ou ajoutez du Kd : le robot oscille");
   if (!tries.length) tries.push("revenez aux réglages d'origine, puis ne changez qu'une chose à la fois");
-  return `Le robot attend. Essayez : ${tries.join(" ; ")}. Puis « Recommencer » (R).`;
+  return `Le robot s'est arrêté. Essayez : ${tries.join(" ; ")}. S'il revoit la ligne, il repart ; sinon, « Recommencer » (R).`;
 }
 
 function drawCamera(step) {
@@ -200,7 +216,7 @@ function press(id) {
   if (id === "zoom") {
     map.close = !map.close;
     at("zoom").setAttribute("aria-pressed", String(map.close));
-    map.draw(way, ghost, state.step);
+    draw();
   }
 }
 
@@ -220,9 +236,7 @@ function listen() {
     }
   });
   addEventListener("resize", () => {
-    if (!state) return;
-    map.draw(way, ghost, state.step);
-    for (const strip of strips) strip.draw(way);
+    if (state) draw();
   });
 }
 
