@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from factorlab.report.style import blank, thin
@@ -16,6 +17,7 @@ __all__ = ["journey_figure"]
 Array = NDArray[np.float64]
 TRACK, TRUTH, GUESS, ODOMETRY, AIM = "#b8bec4", "#0072B2", "#D55E00", "#666666", "#009E73"
 AIM_CM = 2.0
+SPACE_M = 0.5  # of line before and behind the way
 TALLEST, FLATTEST = 0.55, 0.12  # height of the map, as shares of its width
 
 
@@ -27,6 +29,7 @@ def journey_figure(table: Mapping[str, Array], line: Array) -> Figure:
     table : columns (N,) named as in `factorlab.live.follower.journey.COLUMNS`
     line : (M, 2) m
     """
+    line = _near(line, table)
     x = np.concatenate([line[:, 0], table["x_m"]])
     y = np.concatenate([line[:, 1], table["y_m"], table["y_odo_m"]])
     share = min(max(float(np.ptp(y) / max(np.ptp(x), 1e-3)), FLATTEST), TALLEST)
@@ -46,10 +49,19 @@ def journey_figure(table: Mapping[str, Array], line: Array) -> Figure:
     offset.set(ylabel="écart latéral (cm)")
     command.plot(seen["t_s"], seen["w_rad_s"], color=GUESS)
     command.set(xlabel="temps (s)", ylabel="commande (rad/s)")
+    for ax in axes[:, 0]:
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}".replace(".", ",").replace("-", "−")))
     for ax in (offset, command):
         _shade_lost(ax, table)
         ax.set_xlim(float(table["t_s"][0]), max(float(table["t_s"][-1]), 0.1))
     return figure
+
+
+def _near(line: Array, table: Mapping[str, Array]) -> Array:
+    """The part of a line along which the robot drove."""
+    low, high = table["x_m"].min() - SPACE_M, table["x_m"].max() + SPACE_M
+    return line[(line[:, 0] >= low) & (line[:, 0] <= high)]
 
 
 def _shade_lost(axes: Axes, table: Mapping[str, Array]) -> None:

@@ -32,17 +32,8 @@ def tell(server, wish, **headers):
     return answer.status, json.loads(body) if answer.status != 403 else {}
 
 
-FILES = [
-    "",
-    "page.css",
-    "page.js",
-    "controls.js",
-    "map.js",
-    "strips.js",
-    "look.css",
-    "elements.js",
-    "theme.js",
-]
+OWN = ("", "page.css", "page.js", "controls.js", "map.js", "strips.js")
+SHARED = ("look.css", "elements.js", "theme.js")
 
 
 @pytest.mark.parametrize("name", [*OWN, *SHARED])
