@@ -15,7 +15,7 @@ import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import Formatter
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart
 TRUTH = {"color": "black", "linewidth": 1.6, "linestyle": "--", "zorder": 4}
@@ -48,12 +48,23 @@ def panels(rows=1, columns=1, *, size=(8.0, 4.0), title="", **grid):
     return figure, list(figure.subplots(rows, columns, squeeze=False, **grid).ravel())
 
 
-class CommaFormatter(ScalarFormatter):
-    """Plain tick labels with a decimal comma."""
+class CommaFormatter(Formatter):
+    """Tick labels of another formatter, with a decimal comma."""
+
+    def __init__(self, plain):
+        self.plain = plain
 
     def __call__(self, x, pos=None):
         """The label of the tick at x."""
-        return super().__call__(x, pos).replace(".", ",")
+        return french(self.plain(x, pos))
+
+    def format_ticks(self, values):
+        """The labels of all ticks."""
+        return [french(label) for label in self.plain.format_ticks(values)]
+
+    def get_offset(self):
+        """What is written at the axis's end."""
+        return french(self.plain.get_offset())
 
 
 def french(text):
@@ -89,13 +100,12 @@ def save(figure, part=""):
 
 
 def _in_french(figure):
-    """A decimal comma in all that the figure says: its words, and its plain tick labels."""
+    """A decimal comma in all that the figure says: its words and its tick labels."""
     for text in figure.findobj(Text):
         text.set_text(french(text.get_text()))
     for axes in figure.axes:
         for axis in filter(None, (axes.xaxis, axes.yaxis, getattr(axes, "zaxis", None))):
-            plain = axis.get_major_formatter()
-            if type(plain) is ScalarFormatter:
-                comma = CommaFormatter()
-                vars(comma).update(vars(plain))
-                axis.set_major_formatter(comma)
+            for ticks in (axis.major, axis.minor):
+                plain = ticks.formatter
+                if not isinstance(plain, CommaFormatter):
+                    ticks.formatter = CommaFormatter(plain)
