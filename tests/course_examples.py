@@ -23,7 +23,7 @@ def example(folder, name, *lines):
     return path
 
 
-def picture(folder, name, size=(1400, 900)):
+def picture(name, size=(900, 500)):
     """A line that draws a noisy picture with a thin blue line."""
     return f"""
 from PIL import Image

@@ -57,8 +57,10 @@ def record(rng, minutes=10.0):
 
 
 def still_part(recording):
-    """La plus longue partie immobile."""
-    return recording.select(max(StillDetector().find(recording), key=len))
+    """La plus longue partie immobile, sans sa première ni sa dernière demi-seconde, où la main est là."""
+    rows = max(StillDetector().find(recording), key=len)
+    edge = round(0.5 * recording.rate)
+    return recording.select(rows[edge:-edge])
 
 
 def describe(still):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factorlab.cli.faults import CHECK_FAILED, in_one_sentence
-from factorlab.cli.settings import Command, as_json, command_line, print_json, with_options
+from factorlab.cli.settings import Command, as_json, print_json, with_options
 
 if TYPE_CHECKING:
     from factorlab.l19.results import Outcome, Work
@@ -107,8 +107,24 @@ def _work(options: Mapping[str, Any], folder: Path) -> Work:
         name=options["nom"],
         recordings=recordings,
         whole=not any(only),
-        command=command_line(),
+        command=_command(options),
     )
+
+
+def _command(options: Mapping[str, Any]) -> str:
+    """The command with the options that were given, as it can be typed again."""
+    import shlex
+
+    words = ["factorlab", "l19", "rapport"]
+    for parameter in rapport.params:
+        name = parameter.name or ""
+        value = options.get(name)
+        if value in (None, "", False) or value == parameter.default:
+            continue
+        words.append("-o" if name == "out" else f"--{name}")
+        if value is not True:
+            words += [str(one) for one in (value if isinstance(value, tuple) else (value,))]
+    return shlex.join(word for word in words if word not in {"--force", "--as_json"})
 
 
 def _own(

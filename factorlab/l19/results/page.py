@@ -14,7 +14,7 @@ from factorlab.report.words import number
 
 __all__ = ["CLAIM_HEADINGS", "Work", "cells", "results_page", "verdict_of"]
 
-CLAIM_HEADINGS = ("grandeur", "valeur", "tolérance", "mesuré sur", "verdict")
+CLAIM_HEADINGS = ("grandeur", "valeur", "tolérance", "source", "verdict")
 GOOD, BAD, TOLD, FAILED, MISSING, SILENT = "bon", "HORS TOLÉRANCE", "dit", "ÉCHEC", "PAS DE FICHIER", "MUET"
 
 
@@ -82,7 +82,7 @@ def _head(work: Work) -> list[str]:
     scripts = "exemple a tourné" if len(work.outcomes) == 1 else "exemples ont tourné"
     lines.append(
         f"{len(work.outcomes)} {scripts} ; {good} grandeurs sur {len(judged)} sont dans la tolérance que "
-        "leur exemple annonce, bornes comprises.  « Mesuré sur » dit d'où vient la grandeur : d'une "
+        "leur exemple annonce, bornes comprises.  « Source » dit d'où vient la grandeur : d'une "
         "simulation, ou de l'enregistrement réel nommé.  Les temps, qui dépendent de la machine, sont à la "
         "fin et ne sont pas jugés."
     )
