@@ -16,12 +16,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from textwrap import indent
 
 from sequential.errors import DataError, FileFormatError
 
 __all__ = ["Entry", "Sheet", "as_text", "in_plain_text", "read_sheet", "verified"]
 
 LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
+FENCED = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 WEB = ("http://", "https://", "#")
 
 
@@ -86,6 +88,7 @@ def read_sheet(path: Path | str) -> Sheet:
     names = [entry.title for entry in entries]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise FileFormatError(f"{path}: two entries are called {twice!r}; give each a name of its own")
+    _links(path, "the introduction", introduction)
     return Sheet(path, title[2:].strip(), introduction.strip(), entries)
 
 
@@ -115,20 +118,24 @@ def as_text(sheet: Sheet, found: Mapping[str, str]) -> str:
 
 
 def in_plain_text(markdown: str) -> str:
-    """Markdown as a terminal shows it: no marks of emphasis or code, links by their words and their file."""
+    """Markdown as a terminal shows it: no marks of emphasis, code set in, links by their words and their file."""
     text = LINK.sub(lambda m: m[1] if m[1] == Path(m[2]).name else f"{m[1]} ({Path(m[2]).name})", markdown)
-    text = re.sub(r"^```\w*\n", "", text, flags=re.MULTILINE)
+    text = FENCED.sub(lambda m: indent(m[1], "    "), text)
     text = re.sub(r"\*\*(.+?)\*\*|(?<!\w)\*([^*\n]+)\*(?!\w)", lambda m: m[1] or m[2], text)
-    return text.replace("`", "").strip()
+    return text.replace("`", "").strip("\n").rstrip()
 
 
 def _entry(path: Path, part: str) -> Entry:
     title, _, text = part.partition("\n")
-    links = tuple(target for _, target in LINK.findall(text) if not target.startswith(WEB))
+    links = _links(path, f"the entry {title.strip()!r}", text)
     if not links:
         raise FileFormatError(f"{path}: the entry {title.strip()!r} links to no example; each needs one")
-    if lost := [link for link in links if not (path.parent / link.partition("#")[0]).exists()]:
-        raise FileFormatError(
-            f"{path}: the entry {title.strip()!r} links to {lost[0]}, and no such file exists"
-        )
     return Entry(title.strip(), text.strip(), links)
+
+
+def _links(path: Path, where: str, text: str) -> tuple[str, ...]:
+    """Targets of the links to files, each of which must be there."""
+    links = tuple(target for _, target in LINK.findall(text) if not target.startswith(WEB))
+    if lost := [link for link in links if not (path.parent / link.partition("#")[0]).exists()]:
+        raise FileFormatError(f"{path}: {where} links to {lost[0]}, and no such file exists")
+    return links

@@ -46,7 +46,8 @@ def test_a_sheet_has_a_title_an_introduction_and_entries(write):
         (("## ", "### "), "has entries"),
         (("## Biais", "## Bruit"), "two entries are called 'Bruit'"),
         ((" : [exemple.py](exemple.py)", ""), "'Biais' links to no example"),
-        (("(exemple.py)", "(absent.py)"), "links to absent.py, and no such file"),
+        (("(exemple.py)", "(absent.py)"), "'Biais' links to absent.py, and no such file"),
+        (("Deux mots.", "[Deux](mots.md)."), "the introduction links to mots.md, and no such file"),
     ],
 )
 def test_a_sheet_that_is_out_of_order_is_refused(write, change, words):
@@ -83,7 +84,7 @@ def test_a_terminal_shows_words_without_marks():
     text = in_plain_text(
         "Le **bruit**, *fort*, `2*x*y` ; voir [F1](../01_f1.py) et [02.py](../02.py).\n\n```\ny\n```"
     )
-    assert text == "Le bruit, fort, 2*x*y ; voir F1 (01_f1.py) et 02.py.\n\ny"
+    assert text == "Le bruit, fort, 2*x*y ; voir F1 (01_f1.py) et 02.py.\n\n    y"
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.md")), ids=lambda path: path.stem)
