@@ -23,7 +23,7 @@ from sequential.errors import DataError, FileFormatError
 __all__ = ["Entry", "Sheet", "as_text", "in_plain_text", "read_sheet", "verified"]
 
 LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
-FENCED = re.compile(r"^```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCED = re.compile(r"^```\w*\n(.*?)\n```$", re.MULTILINE | re.DOTALL)
 WEB = ("http://", "https://", "#")
 
 
@@ -118,7 +118,7 @@ def as_text(sheet: Sheet, found: Mapping[str, str]) -> str:
 
 
 def in_plain_text(markdown: str) -> str:
-    """Markdown as a terminal shows it: no marks of emphasis, code set in, links by their words and their file."""
+    """Markdown as a terminal shows it: no marks, code set in, links by their words and their file."""
     text = LINK.sub(lambda m: m[1] if m[1] == Path(m[2]).name else f"{m[1]} ({Path(m[2]).name})", markdown)
     text = FENCED.sub(lambda m: indent(m[1], "    "), text)
     text = re.sub(r"\*\*(.+?)\*\*|(?<!\w)\*([^*\n]+)\*(?!\w)", lambda m: m[1] or m[2], text)
