@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from factorlab.l19.challenge.files import FILTER, LOG, MODEL, TUNE
 from factorlab.l19.challenge.judge import Judged, Row
 from factorlab.l19.challenge.rivals import OURS, kalman
+from factorlab.l19.challenge.scoring import MOST
 from factorlab.l19.challenge.trials import HIDDEN, public_trial
 from factorlab.l19.challenge.words import GOOD, HEADINGS, METRICS, cells_of, points, verdict_of
 from factorlab.report.document import Document, Section, Table, Verdict
@@ -85,7 +86,8 @@ def _conclusion(judged: Judged) -> str:
     score, parts = points(judged.row.score), sorted(judged.row.parts, key=lambda part: part.points - part.of)
     poor = [part.name for part in parts if part.share < GOOD]
     beaten = [part.name for part in judged.row.parts if part.beats]
-    best = f" Mieux que notre Kalman : {', '.join(beaten)}." if beaten else ""
+    worth_telling = beaten and judged.row.score >= GOOD * MOST  # not filtering at all has no delay either
+    best = f" Mieux que notre Kalman : {', '.join(beaten)}." if worth_telling else ""
     if not poor:
         return f"Note : {score} / 20. Il n'y a rien à reprendre.{best}"
     return f"Note : {score} / 20. À reprendre d'abord : {poor[0]}.{best}"

@@ -57,27 +57,34 @@ def _pair_of_public() -> Pair:
 
 def _as_rows(given: Any, count: int) -> tuple[Array, str]:
     """Estimates (N,) or (N, 2), and what is wrong with them in one sentence."""
-    nothing = np.zeros(0)
+    values = np.zeros(0)
     if given is None:
-        return nothing, f"{ASKED} n'a rien renvoyé : un return oublié ?"
+        return values, f"{ASKED} n'a rien renvoyé : un return oublié ?"
+    if np.iscomplexobj(given):
+        return values, f"{ASKED} doit renvoyer des nombres réels ; reçu : des nombres complexes"
     try:
         values = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
         kind = type(given).__name__
-        return nothing, f"{ASKED} doit renvoyer un tableau de {count} nombres ; reçu : {kind}"
+        return values, f"{ASKED} doit renvoyer un tableau de {count} nombres ; reçu : {kind}"
     if isinstance(given, tuple) and values.shape == (2, count):
         values = values.T  # estimates and their σ, as a pair
     if values.ndim == 2 and values.shape[1] == 1:
         values = values[:, 0]
+    return values, _wrong_with(values, count)
+
+
+def _wrong_with(values: Array, count: int) -> str:
+    """What keeps numbers from being estimates for N readings; nothing, as a rule."""
     if values.shape not in {(count,), (count, 2)}:
-        return nothing, (
+        return (
             f"pour {count} mesures, {ASKED} doit renvoyer ({count},) estimations, ou ({count}, 2) avec leurs "
             f"σ ; reçu : {values.shape}"
         )
     bad = np.flatnonzero(~np.isfinite(values.reshape(count, -1)).all(axis=1))
     if len(bad):
-        return nothing, f"l'estimation n° {bad[0]} n'est pas un nombre fini ({len(bad)} sur {count} en tout)"
+        return f"l'estimation n° {bad[0]} n'est pas un nombre fini ({len(bad)} sur {count} en tout)"
     if values.ndim == 2 and (values[:, 1] <= 0.0).any():
         row = int(np.flatnonzero(values[:, 1] <= 0.0)[0])
-        return nothing, f"σ doit être positif ; à l'instant n° {row} il vaut {values[row, 1]:g}"
-    return values, ""
+        return f"σ doit être positif ; à l'instant n° {row} il vaut {values[row, 1]:g}"
+    return ""

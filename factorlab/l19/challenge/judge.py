@@ -112,7 +112,8 @@ def _fault(events: tuple[Any, ...], stopped: Fault | None, ended: Fault | None) 
         return f"votre fichier ne définit pas {ASKED}{hint}", f"écrivez def {ASKED}(t, z): …"
     if "fault" in last:
         fault = Fault(**last["fault"])
-        return f"{ASKED} s'est arrêté : {fault.said}", _at(fault)
+        called = f"{ASKED} est appelé avec deux tableaux : def {ASKED}(t, z)"
+        return f"{ASKED} s'est arrêté : {fault.said}", fault.where or called
     if "wrong" in last:
         return last["wrong"], "« factorlab l19 defi -o DOSSIER » écrit un exemple : mon_filtre.py"
     if ended is not None:

@@ -49,6 +49,10 @@ WRONG = {
     "name": ("def filtre(t, z):\n    return z", "filtre en est-il un autre nom ?"),
     "nothing": ("x = 3", "ne définit pas filtrer"),
     "signature": ("def filtrer(z):\n    return z", "TypeError"),
+    "complex": ("def filtrer(t, z):\n    return z * 1j", "nombres complexes"),
+    "generator": ("def filtrer(t, z):\n    return (x for x in z)", "reçu : generator"),
+    "killed": ("import os\ndef filtrer(t, z):\n    os._exit(0)", "arrêté net"),
+    "no_function": ("filtrer = 3", "ne définit pas filtrer"),
     "raises": ("def filtrer(t, z):\n    return z / [1, 2]", "filtrer s'est arrêté"),
     "syntax": ("def filtrer(t, z)\n    return z", "avant la fin"),
     "exits": ("import sys\nsys.exit(2)", "avant la fin"),
@@ -118,6 +122,26 @@ def test_a_pair_of_rows_is_as_good_as_columns(tmp_path):
     pair = KALMAN.replace("return np.array(out)", "out = np.array(out)\n    return out[:, 0], out[:, 1]")
     scores = [json.loads(judged(tmp_path, text, "--json").stdout)["score"] for text in (KALMAN, pair)]
     assert scores[0] == scores[1]
+
+
+def test_the_library_s_own_filter_may_be_used(tmp_path):
+    text = """
+import sequential as sq
+
+def filtrer(t, z):
+    thermometer = sq.LinearSensor([[1.0, 0.0]], 0.24, gate=0.999)
+    model = sq.StateSpace(sq.Vector(2), sq.Gaussian([z[0], 0.0], [1.0, 0.25]), sq.ConstantVelocity(7.3e-4),
+                          {"z": thermometer})
+    run = sq.run(sq.KalmanFilter(), model, sq.SensorLog({"z": sq.Stream(t, z)}))
+    return run.mean[:, 0], np.sqrt(run.cov[:, 0, 0])
+"""
+    assert json.loads(judged(tmp_path, text, "--json").stdout)["score"] == pytest.approx(20.0, abs=0.2)
+
+
+def test_noise_and_windows_do_no_harm(tmp_path):
+    noisy = "import matplotlib.pyplot as plt\nprint('bonjour' * 1000)\nplt.plot([1, 2]); plt.show()\n"
+    noisy += SMOOTHED + "\nif __name__ == '__main__':\n    1 / 0\n"
+    assert judged(tmp_path, noisy).exit_code == 0
 
 
 def test_a_score_below_what_is_asked_is_3(tmp_path):
