@@ -214,7 +214,7 @@ def e4():
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 1.0])
 def test_components_are_the_naive_ones(e4, shape, share, rng):
     masque = rng.random(shape) < share
-    ours, naive = e4.composantes(masque), e4.composantes_naives(masque)
+    ours, naive = e4.composantes(masque), e4.naive_components(masque)
     assert [area for area, _ in ours] == [area for area, _ in naive]
     np.testing.assert_allclose([c for _, c in ours], [c for _, c in naive], rtol=0, atol=1e-9)
 
