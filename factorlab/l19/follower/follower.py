@@ -24,6 +24,7 @@ OFF_M = 0.10  # from the line: it has left the image
 LIMIT_RAD_S = 4.0  # turn rate
 PATIENCE_S = 0.25  # that a robot without a map keeps its last command for
 AGREED = 3  # images in a row that show the line again
+MOMENTS = 15  # of an exposure, at most
 REMEMBERED = 22  # periods that a shutter may reach back
 
 
@@ -148,7 +149,7 @@ class Follower:
         shutter = self.settings.blur_s
         if shutter <= 0.0:
             return np.atleast_2d(self.pose)
-        count = int(min(max(np.ceil(shutter / 0.004), 5), 25))
+        count = int(min(max(np.ceil(shutter / 0.004), 5), MOMENTS))
         poses = []
         for age in (np.arange(count) + 0.5) / count * shutter:
             back = min(int(age / PERIOD_S), len(self.past) - 1)
