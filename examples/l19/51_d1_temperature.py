@@ -79,22 +79,20 @@ def rms(error):
 
 
 def main():
-    from claims import claim
-    from figures import out_folder
+    from claims import claim, table
+    from figures import out_folder, say
 
     print("\n".join(__doc__.splitlines()[5:]))
     z = TRIAL.z
     R = np.var(z[TRIAL.rest], ddof=1)
     q = tune_q(z, R)
     seen = kalman(z, q, R).innovations["thermometre"]
-    print(f"\nR : σ = {np.sqrt(R):.2f} °C ; refusées : t = {seen.t[~seen.accepted] // 1_000_000_000} s")
+    say(f"\nR : σ = {np.sqrt(R):.2f} °C ; refusées : t = {seen.t[~seen.accepted] // 1_000_000_000} s")
     folder = out_folder() / "defi_d1"
     found = tuned_by_command(folder)
     least, most = found.interval("q")
     print(f"dans {folder} :  {TUNE}")
-    print(
-        f"  q = {found.values['q']:.3g} °C²/s³, à 95 % de {least:.1g} à {most:.1g} : le NIS dépend peu de q"
-    )
+    say(f"  q = {found.values['q']:.3g} °C²/s³, à 95 % de {least:.1g} à {most:.1g} : le NIS dépend peu de q")
 
     low, median = sq.LowPass(coefficient=0.2, interval=1.0), sq.SlidingMedian(9)
     filters = {
@@ -111,8 +109,11 @@ def main():
         delay[name] = measure_step_delay(lambda t, x, smooth=smooth: smooth(t, SIGMA * x) / SIGMA, 1.0)
         error = outputs[name] - TRUTH_C
         ramp[name], plateau[name] = rms(error[TRIAL.ramp]), rms(error[TRIAL.plateau])
-        print(f"{name:24}{delay[name]:12.0f} s{ramp[name]:9.2f} °C{plateau[name]:9.2f} °C")
+        say(f"{name:24}{delay[name]:12.0f} s{ramp[name]:9.2f} °C{plateau[name]:9.2f} °C")
 
+    rows = [(name, delay[name], ramp[name], plateau[name]) for name in filters]
+    headings = "filtre", ("retard à 90 %", "s"), ("RMS rampe", "°C"), ("RMS palier", "°C")
+    table("Un thermomètre : rampe, palier, aberrante", headings, rows)
     draw(z, R, q, outputs)
     claim("D1", "RMS du Kalman réglé sur la rampe", ramp["Kalman"], "°C", low=0.1, high=0.3)
     claim("D1", "RMS du passe-bas sur la rampe", ramp["passe-bas (a = 0,2)"], "°C", low=0.8, high=1.2)

@@ -87,15 +87,18 @@ def check_sigma_points():
     angles, weights = np.radians([180.0, 150.0, -150.0, 160.0, -160.0]), np.array([-99.0] + 4 * [25.0])
     naive = np.arctan2(weights @ np.sin(angles), weights @ np.cos(angles))
     mean = moyenne_circulaire(angles, weights)
-    print(f"moyenne d'angles autour de 180° : {np.degrees(mean):.0f}° ; par atan2 : {np.degrees(naive):.0f}°")
+    print(
+        f"moyenne d'angles autour de 180° : {np.degrees(mean):.0f}° ; par atan2 : {abs(np.degrees(naive)):.0f}°"
+    )
     assert np.isclose(abs(mean), np.pi)
     assert abs(naive) < 0.1
 
 
 def main():
-    from claims import claim
+    from claims import claim, table
+    from figures import say
 
-    excess, expected = other_gains(np.random.default_rng(1))
+    excess, formula = other_gains(np.random.default_rng(1))
     check_sigma_points()
     contest(runs=2)  # le temps d'un premier essai, qui charge les boucles compilées, ne compte pas
     began = perf_counter()
@@ -103,15 +106,26 @@ def main():
     seconds = perf_counter() - began
     weak = contest(RUNS, noise="weak")
     low, high = (bound / 3 for bound in chi2_band(3, RUNS))
-    for name in ("ekf", "ukf"):
-        found = strong.worst(name) <= LOST_M
-        late = strong.nees[name][found][:, strong.late].mean() / 3
-        lost, RMSE = np.sum(~found), strong.rmse(name)
-        print(f"{name.upper()}, fort bruit : perdu (à plus de {LOST_M:.0f} m) {lost} fois sur {RUNS} ; RMSE "
-              f"{RMSE:.1f} m\n     ANEES/3 {strong.anees(name).mean / 3:.0f}, ou {late:.1f} sur la fin sans "
-              f"les essais perdus (à 95 % de {low:.2f} à {high:.2f} attendu)")  # fmt: skip
-        print(f"     faible bruit : RMSE {weak.rmse(name):.3f} m ; ANEES/3 {weak.anees(name).mean / 3:.2f}")
-    draw(strong, weak, excess, expected)
+    rows = []
+    print(f"\n{'bruit':8}{'filtre':8}{'perdus':>8}{'RMSE':>10}{'ANEES/3':>10}  sur la fin, sans les perdus")
+    for noise, drawn in (("fort", strong), ("faible", weak)):
+        for name in ("ekf", "ukf"):
+            kept = drawn.worst(name) <= LOST_M
+            late = drawn.nees[name][kept][:, drawn.late].mean() / 3
+            lost, rmse, honesty = 100 * drawn.lost(name), drawn.rmse(name), drawn.anees(name).mean / 3
+            rows.append((noise, name.upper(), lost, rmse, honesty, late))
+            say(f"{noise:8}{name.upper():8}{lost:6.1f} %{rmse:8.2f} m{honesty:10.2f}{late:10.2f}")
+    say(f"Un filtre honnête a un ANEES/3 de {low:.2f} à {high:.2f} (à 95 %, {RUNS} essais).\n")
+    headings = (
+        "bruit",
+        "filtre",
+        ("perdus", "%"),
+        ("RMSE", "m"),
+        "ANEES/3",
+        "ANEES/3 sur la fin, sans les perdus",
+    )
+    table(f"EKF et UKF, {RUNS} essais", headings, rows)
+    draw(strong, weak, excess, formula)
 
     lost = {name: 100 * strong.lost(name) for name in ("ekf", "ukf")}
     claim("D3", "essais où l'EKF se perd, fort bruit", lost["ekf"], "%", low=8, high=32)
@@ -124,7 +138,7 @@ def main():
     claim("D3", "ANEES/3 de l'UKF, faible bruit", weak.anees("ukf").mean / 3, low=0.89, high=1.12)
     claim("D3", f"temps des {RUNS} essais, deux filtres", seconds, "s")
     assert (excess > 0).all(), "aucun autre gain ne fait mieux"
-    np.testing.assert_allclose(excess, expected, rtol=1e-6)
+    np.testing.assert_allclose(excess, formula, rtol=1e-6)
     assert low <= weak.anees("ekf").mean / 3 <= high, "sous faible bruit, l'EKF est honnête aussi"
     assert strong.anees("ukf").mean < strong.anees("ekf").mean, "l'UKF est moins trop sûr de lui"
 
