@@ -25,7 +25,8 @@ LEAST = 1e-4  # m/s and rad/s: no sensor is perfect
 def line_ahead(x: Any, c: Any) -> Any:
     """How far to the left (2,) the line is, at two distances in front of a robot at x = (x, y, heading).
 
-    For each: c = ahead m, then a place on the line and its direction; the line is straight near it.
+    For each four numbers of c: ahead m, then a place on the line and its direction; the line is straight near
+    it.  The last two of c (10,) are weights, 1/m: one over the standard deviations of the distances.
     """
     cos, sin = np.cos(x[2]), np.sin(x[2])
     out = np.zeros(2)
@@ -33,7 +34,7 @@ def line_ahead(x: Any, c: Any) -> Any:
         ahead, px, py, angle = c[4 * i], c[4 * i + 1], c[4 * i + 2], c[4 * i + 3]
         nx, ny = -np.sin(angle), np.cos(angle)
         gap = nx * (px - x[0] - ahead * cos) + ny * (py - x[1] - ahead * sin)
-        out[i] = gap / (ny * cos - nx * sin)
+        out[i] = gap / (ny * cos - nx * sin) * c[8 + i]
     return out
 
 
@@ -56,7 +57,7 @@ def robot_model(settings: FollowerSettings) -> sq.StateSpace:
         manifold=sq.SE2(),
         prior=sq.Gaussian(np.zeros(3), START_SIGMA**2),
         process=sq.Unicycle(along=speed * root, across=0.0, heading=rate * root),
-        sensors={"line": sq.Sensor(line_ahead, np.full(2, 1e-6), gate=GATE, context=8)},
+        sensors={"line": sq.Sensor(line_ahead, np.ones(2), gate=GATE, context=10)},
         input="odometry",
     )
 
@@ -75,23 +76,27 @@ class Localiser:
     def moved(self, belief: sq.Belief, wheels: Array, gyro: float) -> sq.Belief:
         """After one period, from what wheels (2,) m/s and gyro rad/s read."""
         rate, _ = mixed_rate(wheels, gyro, self.settings)
-        return self.online.predict(belief, PERIOD_S, np.array([wheels.mean(), rate]))
+        return self.online.predict(belief, PERIOD_S, np.array([0.5 * (wheels[0] + wheels[1]), rate]))
 
     def seen(self, belief: sq.Belief, s_m: float, sighting: Sighting) -> tuple[sq.Belief, bool]:
         """After a sighting of the line, and whether it fitted the map (Mahalanobis gate)."""
-        context = self.context(belief.mean, s_m, sighting.ahead)
+        context = self.context(belief.mean, s_m, sighting.ahead, 1.0 / sighting.sigma)
         if context is None:
             return belief, False
-        noise = sighting.variance
-        belief, innovation = self.online.update(belief, "line", sighting.left, context, noise)
+        belief, innovation = self.online.update(belief, "line", sighting.left / sighting.sigma, context)
         return belief, innovation.accepted
 
-    def context(self, pose: Array, s_m: float, ahead: Array) -> Array | None:
-        """(8,) the map where both rows should show it; None where it is not in front."""
+    def context(self, pose: Array, s_m: float, ahead: Array, weights: Array) -> Array | None:
+        """(10,) the map where both rows should show it, and weights; None where it is not in front."""
         crossings = self.track.crossings(pose, ahead, s_m)
-        return None if crossings is None else np.column_stack([ahead, crossings]).ravel()
+        if crossings is None:
+            return None
+        context = np.empty(10)
+        context[:8].reshape(2, 4)[:, 0], context[:8].reshape(2, 4)[:, 1:] = ahead, crossings
+        context[8:] = weights
+        return context
 
     def expected(self, pose: Array, s_m: float, ahead: Array) -> Array | None:
         """(2,) how far to the left the line should be; None where it is not in front."""
-        context = self.context(pose, s_m, ahead)
+        context = self.context(pose, s_m, ahead, np.ones(2))
         return None if context is None else line_ahead(pose, context)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -30,12 +31,12 @@ class Sighting:
     ----------
     ahead : (2,) m in front of the robot's centre, near and far
     left : (2,) m to its left
-    variance : (2,) of `left`, m²
+    sigma : (2,) standard deviations of `left`, m
     """
 
     ahead: Array
     left: Array
-    variance: Array
+    sigma: Array
 
 
 @cache
@@ -47,9 +48,10 @@ def ground_from_pixels() -> Array:
 
 def on_ground(columns: Array, rows: Array) -> tuple[Array, Array]:
     """Places (N, 2) m of pixels, and how far a pixel of column is (N,), m."""
-    q = ground_from_pixels() @ np.stack([columns, rows, np.ones(len(rows))])
-    step = ground_from_pixels()[1, 0] / q[2]  # the camera is level: a column changes y alone
-    return (q[:2] / q[2]).T, np.abs(step)
+    H = ground_from_pixels()
+    q = columns[:, None] * H[:, 0] + rows[:, None] * H[:, 1] + H[:, 2]
+    # the camera is level: a column changes y alone
+    return q[:, :2] / q[:, 2:], np.abs(H[1, 0] / q[:, 2])
 
 
 @cache
@@ -107,7 +109,7 @@ def sight(reading: LineReading, moved: Array) -> Sighting:
     """A reading that was found, in metres; `moved` (3,) is the way since the exposure's middle."""
     pixels = np.array([reading.bottom_px, reading.middle_px])
     places, per_pixel = on_ground(pixels[:, 0], pixels[:, 1])
-    c, s = np.cos(moved[2]), np.sin(moved[2])
-    places = (places - moved[:2]) @ np.array([[c, -s], [s, c]])
-    variance = np.diagonal(reading.cov_px) * per_pixel**2 + FLOOR_M**2
-    return Sighting(places[:, 0], places[:, 1], variance)
+    c, s = math.cos(moved[2]), math.sin(moved[2])
+    dx, dy = places[:, 0] - moved[0], places[:, 1] - moved[1]
+    variance = reading.cov_px.diagonal() * per_pixel**2 + FLOOR_M**2
+    return Sighting(c * dx + s * dy, c * dy - s * dx, np.sqrt(variance))

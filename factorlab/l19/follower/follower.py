@@ -217,6 +217,6 @@ class Follower:
         gyro = rate + own.gyro_noise * noise[2]
         self.belief = self.localiser.moved(self.belief, wheels, gyro)
         turned, _ = mixed_rate(wheels, gyro, own)
-        self.odometry = along_arc(self.odometry, wheels.mean() * PERIOD_S, turned * PERIOD_S)
+        self.odometry = along_arc(self.odometry, 0.5 * (wheels[0] + wheels[1]) * PERIOD_S, turned * PERIOD_S)
         self.trail.append(self.odometry)
         self.count += 1

@@ -21,10 +21,13 @@ def test_the_line_is_expected_where_the_map_has_it():
 
 
 def test_the_sensor_moves_with_the_robot_as_a_straight_line_does():
-    context = np.array([0.14, 0.5, 0.1, 0.0, 0.23, 0.6, 0.1, 0.0])  # the line y = 0.1
-    np.testing.assert_allclose(line_ahead(np.array([0.3, 0.04, 0.0]), context), [0.06, 0.06])
+    context = np.array(
+        [0.14, 0.5, 0.1, 0.0, 0.23, 0.6, 0.1, 0.0, 1.0, 100.0]
+    )  # the line y = 0.1, in m and cm
+    np.testing.assert_allclose(line_ahead(np.array([0.3, 0.04, 0.0]), context), [0.06, 6.0])
+    expected = (0.06 - np.sin(0.1) * np.array([0.14, 0.23])) / np.cos(0.1)
     turned = line_ahead(np.array([0.3, 0.04, 0.1]), context)
-    np.testing.assert_allclose(turned, (0.06 - np.sin(0.1) * np.array([0.14, 0.23])) / np.cos(0.1))
+    np.testing.assert_allclose(turned, expected / [1.0, 0.01])
 
 
 def test_the_better_of_wheels_and_gyro_counts_more():
