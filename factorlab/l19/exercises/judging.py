@@ -19,6 +19,7 @@ ROOMS = {
     "E2": "factorlab.l19.exercises.e2_median",
     "E3": "factorlab.l19.exercises.e3_infrared",
     "E4": "factorlab.l19.exercises.e4_components",
+    "K3": "factorlab.l19.exercises.k3_angle",
 }
 
 

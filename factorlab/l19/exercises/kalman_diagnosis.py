@@ -11,6 +11,7 @@ from factorlab.l19.exercises.finding import Cause, shown
 from factorlab.l19.exercises.kalman_driver import Drive, Stage
 from factorlab.l19.exercises.kalman_mutants import PREDICTED_COV, PREDICTED_STATE, Update, updates
 from factorlab.l19.exercises.kalman_systems import Array, System
+from factorlab.l19.exercises.signatures import imported
 
 __all__ = [
     "ARGUMENTS",
@@ -18,7 +19,6 @@ __all__ = [
     "close",
     "correction_causes",
     "example_lines",
-    "imported",
     "predicted_cause",
     "right_after",
 ]
@@ -112,13 +112,6 @@ def example_lines(system: System, style: str, module: str, upto: str) -> str:
     if upto == "corriger":
         rows.append(f"r = kf.corriger({_handed(system.measurements[0], style)})")
     return "\n".join(rows)
-
-
-def imported(module: str, name: str) -> str:
-    """The line that imports a name from a student's file, whatever the file is called."""
-    if module.isidentifier():
-        return f"from {module} import {name}"
-    return f'{name} = __import__("{module}").{name}'
 
 
 def _handed(vector: Array, style: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
-__all__ = ["misspelt", "signature_fault"]
+__all__ = ["imported", "misspelt", "signature_fault"]
 
 ENGLISH = {
     "predire": ("predict",),
@@ -39,3 +39,10 @@ def signature_fault(function: Any, wanted: tuple[str, ...]) -> str:
         asked = ", ".join(wanted)
         return f"prend ({own}) au lieu de ({asked})"
     return ""
+
+
+def imported(module: str, name: str) -> str:
+    """The line that imports a name from a student's file, whatever the file is called."""
+    if module.isidentifier():
+        return f"from {module} import {name}"
+    return f'{name} = __import__("{module}").{name}'

@@ -108,6 +108,8 @@ def _end(code: int, limit_s: float, complaint: str, *, late: bool) -> Fault:
         return Fault("durée", f"toujours pas fini après {limit_s:g} s : une boucle sans fin ?")
     last = complaint.strip().splitlines()[-1:] or ["sans un mot"]
     how = f"signal {-code}" if code < 0 else f"code {code}"
+    if code == -signal.SIGSEGV:
+        how += ", la pile a débordé : sans doute une récursion ; remplacez-la par une file ou une boucle"
     return Fault("mort", f"le programme s'est arrêté net ({how}, {last[0]})")
 
 

@@ -9,10 +9,21 @@ from pathlib import Path
 from factorlab.l19.exercises.fault import Fault
 from factorlab.l19.exercises.signatures import misspelt
 
-__all__ = ["EXERCISES", "Survey", "survey"]
+__all__ = ["EXERCISES", "OPTIONAL", "Survey", "survey"]
 
 EXERCISES: dict[str, tuple[str, ...]] = {
     "E1": ("Kalman", "nis_moyen"),
+    "E2": ("median_glissant", "detecter_sauts"),
+    "E3": ("ajuster", "distance", "incertitude_distance"),
+    "E4": ("composantes", "plus_gros_objet"),
+}
+# judged where a file offers one of these names; none of them is asked for
+OPTIONAL: dict[str, tuple[str, ...]] = {
+    "K3": (
+        *("replier", "replier_angle", "normaliser_angle", "wrap", "wrap_angle", "wrap_to_pi"),
+        *("innovation", "innovation_angle", "difference_angle", "ecart_angle"),
+        *("KalmanAngle", "EKF", "KalmanEtendu"),
+    ),
 }
 
 
@@ -29,7 +40,7 @@ class Survey:
         """Names of an exercise that the file lacks, each with what may have been meant."""
         return {
             name: misspelt(name, (one for one in self.names if one not in EXERCISES[exercise]))
-            for name in EXERCISES[exercise]
+            for name in EXERCISES.get(exercise, ())
             if name not in self.names
         }
 
@@ -55,7 +66,7 @@ def survey(path: Path, *, imported: bool = True) -> Survey:
     except ValueError as error:  # a null byte
         return Survey(path, fault=Fault("syntaxe", f"ce n'est pas un fichier Python ({error})"))
     names = tuple(dict.fromkeys(name for node in tree.body for name in _defined(node, imported=imported)))
-    found = tuple(e for e, wanted in EXERCISES.items() if set(wanted) & set(names))
+    found = tuple(e for e, wanted in {**EXERCISES, **OPTIONAL}.items() if set(wanted) & set(names))
     return Survey(path, names, found)
 
 

@@ -14,6 +14,7 @@ TITLES = {
     "E2": "médiane glissante et sauts",
     "E3": "capteur infrarouge",
     "E4": "composantes connexes",
+    "K3": "angles repliés (facultatif)",
 }
 WORDS = {PASS: "juste", WARN: "juste, avec des remarques", FAIL: "à corriger"}
 COLOURS = {PASS: "green", WARN: "green", FAIL: "red"}

@@ -1,0 +1,300 @@
+"""E2, E3, E4 and K3 as students write them: right solutions, and the lines that a mistake changes."""
+
+E2 = """
+import numpy as np
+
+def median_glissant(x, k):
+    h = k // 2
+    y = np.zeros(len(x))
+    for i in range(len(x)):
+        y[i] = np.median(x[max(0, i - h):i + h + 1])
+    return y
+
+def detecter_sauts(x, k, seuil):
+    x = np.asarray(x, float)
+    h = k // 2
+    sauts = []
+    for i in range(len(x)):
+        fenetre = x[max(0, i - h):i + h + 1]
+        m = np.median(fenetre)
+        mad = np.median(np.abs(fenetre - m))
+        if abs(x[i] - m) > seuil * 1.4826 * mad:
+            sauts.append(i)
+    return sauts
+"""
+
+# the statement's own, near enough: padding, a global MAD, np.where
+E2_NAIVE = """
+import numpy as np
+
+def median_glissant(x, k):
+    demi = k // 2
+    complet = np.pad(x, demi, mode="edge")
+    return np.array([np.median(complet[i:i + k]) for i in range(len(x))])
+
+def detecter_sauts(x, k, seuil):
+    ecart = np.abs(x - median_glissant(x, k))
+    mad = np.median(ecart)
+    return np.where(ecart > seuil * 1.4826 * mad)
+"""
+
+E2_LISTS = """
+def median_glissant(x, k):
+    resultat = []
+    for i in range(len(x)):
+        debut, fin = max(0, i - k // 2), min(len(x), i + k // 2 + 1)
+        fenetre = sorted(x[debut:fin])
+        n = len(fenetre)
+        resultat.append(fenetre[n // 2] if n % 2 else (fenetre[n // 2 - 1] + fenetre[n // 2]) / 2)
+    return resultat
+
+def detecter_sauts(x, k, seuil):
+    m = median_glissant(x, k)
+    ecarts = [abs(a - b) for a, b in zip(x, m)]
+    mad = median_glissant(ecarts, k)
+    return [i for i in range(len(x)) if ecarts[i] > seuil * mad[i]]
+"""
+
+E3 = """
+import numpy as np
+
+def ajuster(d, v):
+    a, b, c = 10.0, 0.0, 0.0
+    for _ in range(100):
+        r = v - (a / (d + b) + c)
+        J = np.column_stack([1 / (d + b), -a / (d + b) ** 2, np.ones(len(d))])
+        pas = np.linalg.lstsq(J, r, rcond=None)[0]
+        a, b, c = a + pas[0], b + pas[1], c + pas[2]
+    return a, b, c
+
+def distance(v, a, b, c):
+    return a / (v - c) - b
+
+def incertitude_distance(v, a, b, c, sigma_v):
+    return a / (v - c) ** 2 * sigma_v
+"""
+
+E3_SCIPY = """
+from scipy.optimize import curve_fit
+
+def modele(d, a, b, c):
+    return a / (d + b) + c
+
+def ajuster(d, v):
+    popt, pcov = curve_fit(modele, d, v, p0=[20.0, 1.0, 0.1])
+    return popt, pcov
+
+def distance(v, params):
+    a, b, c = params
+    return a / (v - c) - b
+
+def incertitude_distance(v, params, sigma=0.02):
+    a, b, c = params
+    d = distance(v, params)
+    return abs((d + b) ** 2 / a) * sigma
+"""
+
+E3_DICT = """
+import numpy as np
+
+def ajuster(d, v):
+    meilleur = None
+    bas, haut = 0.0, 20.0
+    for _ in range(8):
+        for b in np.linspace(bas, haut, 101):
+            A = np.column_stack([1 / (d + b), np.ones(len(d))])
+            p = np.linalg.lstsq(A, v, rcond=None)[0]
+            s = np.sum((A @ p - v) ** 2)
+            if meilleur is None or s < meilleur[0]:
+                meilleur = s, p[0], b, p[1]
+        pas = (haut - bas) / 100
+        bas, haut = meilleur[2] - pas, meilleur[2] + pas
+    return {"a": meilleur[1], "b": meilleur[2], "c": meilleur[3]}
+
+def distance(v, modele):
+    return modele["a"] / (v - modele["c"]) - modele["b"]
+
+def incertitude_distance(v, modele, ecart_type):
+    h = 1e-6
+    return abs(distance(v + h, modele) - distance(v - h, modele)) / (2 * h) * ecart_type
+"""
+
+E4 = """
+from collections import deque
+import numpy as np
+
+def composantes(masque):
+    h, w = masque.shape
+    vu = np.zeros((h, w), bool)
+    res = []
+    for i in range(h):
+        for j in range(w):
+            if masque[i, j] and not vu[i, j]:
+                file = deque([(i, j)])
+                vu[i, j] = True
+                pix = []
+                while file:
+                    y, x = file.popleft()
+                    pix.append((x, y))
+                    for dy, dx in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                        a, b = y + dy, x + dx
+                        if 0 <= a < h and 0 <= b < w and masque[a, b] and not vu[a, b]:
+                            vu[a, b] = True
+                            file.append((a, b))
+                cx, cy = np.mean(pix, axis=0)
+                res.append((len(pix), (cx, cy)))
+    res.sort(key=lambda c: c[0], reverse=True)
+    return res
+
+def plus_gros_objet(masque, aire_min):
+    objets = composantes(masque)
+    if not objets or objets[0][0] < aire_min:
+        return None
+    return objets[0][1]
+"""
+
+E4_ROWS = E4.replace("pix.append((x, y))", "pix.append((y, x))").replace("< aire_min", "<= aire_min")
+
+E4_FLAT = E4.replace(
+    "res.append((len(pix), (cx, cy)))", "res.append([len(pix), round(cx), round(cy)])"
+).replace("objets[0][1]", "objets[0][1:]")
+
+K3 = """
+import numpy as np
+
+def replier(a):
+    return (a + np.pi) % (2 * np.pi) - np.pi
+
+def innovation(z, prevu):
+    return replier(z - prevu)
+
+class KalmanAngle:
+    def __init__(self, F, B, H, Q, R, x0, P0):
+        self.F, self.B, self.H, self.Q, self.R, self.x, self.P = F, B, H, Q, R, x0, P0
+
+    def predire(self, u):
+        self.x = self.F @ self.x + self.B @ u
+        self.P = self.F @ self.P @ self.F.T + self.Q
+
+    def corriger(self, z):
+        nu = innovation(z, self.H @ self.x)
+        S = self.H @ self.P @ self.H.T + self.R
+        K = self.P @ self.H.T @ np.linalg.inv(S)
+        self.x = self.x + K @ nu
+        self.P = self.P - K @ self.H @ self.P
+        return nu / np.sqrt(S[0, 0])
+"""
+
+RIGHT = {
+    "E2": E2, "E2 naïf": E2_NAIVE, "E2 listes": E2_LISTS, "E3": E3, "E3 scipy": E3_SCIPY, "E3 dict": E3_DICT,
+    "E4": E4, "E4 lignes": E4_ROWS, "E4 plat": E4_FLAT, "K3": K3,
+}  # fmt: skip
+
+MEDIAN = "np.median(x[max(0, i - h):i + h + 1])"
+JUMP = "if abs(x[i] - m) > seuil * 1.4826 * mad:"
+MAD = "mad = np.median(np.abs(fenetre - m))"
+FIT = "return a, b, c"
+INVERSE = "return a / (v - c) - b"
+SIGMA = "return a / (v - c) ** 2 * sigma_v"
+STEPS = "((1, 0), (-1, 0), (0, 1), (0, -1))"
+CENTRE = "cx, cy = np.mean(pix, axis=0)"
+SORT = "res.sort(key=lambda c: c[0], reverse=True)"
+MARK = "                            vu[a, b] = True\n"
+BIG = "    return objets[0][1]\n"
+FOLD = "return (a + np.pi) % (2 * np.pi) - np.pi"
+
+# (solution, cause, the lines that are changed)
+WRONG = [
+    (E2, "moyenne au lieu de la médiane", [(MEDIAN, MEDIAN.replace("median", "mean"))]),
+    (E2, "fenêtre vers le passé seulement", [(MEDIAN, "np.median(x[max(0, i - k + 1):i + 1])")]),
+    (E2, "k pris pour une demi-fenêtre", [("    h = k // 2\n    y", "    h = k\n    y")]),
+    (E2, "dernière mesure de la fenêtre oubliée", [(MEDIAN, "np.median(x[max(0, i - h):i + h])")]),
+    (E2, "fenêtre pas triée", [(MEDIAN, "x[i]")]),
+    (E2, "médiane de valeurs déjà filtrées", [("y = np.zeros(len(x))", "y = x = np.array(x, float)")]),
+    (E2, "argument modifié", [("y = np.zeros(len(x))", "y = x")]),
+    (E2, "bords coupés", [("    return y", "    return y[h:len(x) - h]")]),
+    (E2, "écart-type au lieu de la MAD", [(MAD, "mad = np.std(fenetre) / 1.4826")]),
+    (E2, "écart-type global au lieu de la MAD", [(MAD, "mad = np.std(x) / 1.4826")]),
+    (E2, "valeur absolue oubliée", [(JUMP, JUMP.replace("abs(x[i] - m)", "x[i] - m"))]),
+    (E2, "seuil absolu", [(JUMP, "if abs(x[i] - m) > seuil:")]),
+    (E2, "seuil ignoré (σ)", [(JUMP, JUMP.replace("seuil * ", ""))]),
+    (E2, "MAD sans valeur absolue", [(MAD, "mad = np.median(fenetre - m)")]),
+    (E2, "comparaison à l'envers", [(JUMP, JUMP.replace(">", "<"))]),
+    (E2, "valeurs au lieu des indices", [("sauts.append(i)", "sauts.append(x[i])")]),
+    (E2, "return oublié", [("    return sauts", "    pass")]),
+    (E3, "ordre des constantes (b avant a)", [(FIT, "return b, a, c")]),
+    (E3, "b oubliée dans l'ajustement",
+     [("-a / (d + b) ** 2, ", ""), ("b + pas[1], c + pas[2]", "b, c + pas[1]")]),
+    (E3, "ajustement qui n'a pas convergé", [("range(100)", "range(1)")]),
+    (E3, "signe de b", [(FIT, "return a, -b, c")]),
+    (E3_SCIPY, "d et v échangés", [("def ajuster(d, v)", "def ajuster(v, d)")]),
+    (E3, "b oubliée", [(INVERSE, "return a / (v - c)")]),
+    (E3, "signe de b", [(INVERSE, "return a / (v - c) + b")]),
+    (E3, "c oubliée", [(INVERSE, "return a / v - b")]),
+    (E3, "formule directe au lieu de son inverse", [(INVERSE, "return a / (v + b) + c")]),
+    (E3, "incertitude sans la dérivée", [(SIGMA, "return sigma_v")]),
+    (E3, "dérivée à l'envers", [(SIGMA, "return (v - c) ** 2 / a * sigma_v")]),
+    (E3, "carré oublié", [(SIGMA, "return a / (v - c) * sigma_v")]),
+    (E3, "variance au lieu de l'écart-type", [(SIGMA, "return (a / (v - c) ** 2 * sigma_v) ** 2")]),
+    (E3, "signe de la dérivée", [(SIGMA, "return -a / (v - c) ** 2 * sigma_v")]),
+    (E4, "8-connexité au lieu de la 4-connexité",
+     [(STEPS, "[(p, q) for p in (-1, 0, 1) for q in (-1, 0, 1) if p or q]")]),
+    (E4, "diagonales au lieu des côtés", [(STEPS, "((1, 1), (1, -1), (-1, 1), (-1, -1))")]),
+    (E4, "voisins oubliés (gauche et haut)", [(STEPS, "((1, 0), (0, 1))")]),
+    (E4, "bord de l'image dépassé", [("0 <= a < h and 0 <= b < w and ", "")]),
+    (E4, "l'image se replie à ses bords", [("0 <= a < h and 0 <= b < w and ", "a < h and b < w and ")]),
+    (E4, "bords de l'image oubliés",
+     [("0 <= a < h and 0 <= b < w", "0 < a < h - 1 and 0 < b < w - 1"), ("in range(h)", "in range(1, h - 1)"),
+      ("in range(w)", "in range(1, w - 1)")]),
+    (E4, "de la plus petite à la plus grande", [(SORT, "res.sort(key=lambda c: c[0])")]),
+    (E4, "pas triées", [(SORT, "pass")]),
+    (E4, "fond compté", [("masque[", "not masque[")]),
+    (E4, "pixels comptés plusieurs fois",
+     [(MARK, ""), ("file.popleft()\n", "file.popleft(); vu[y, x] = True\n")]),
+    (E4, "centre de la boîte au lieu du centre de gravité",
+     [(CENTRE, "cx, cy = (np.min(pix, axis=0) + np.max(pix, axis=0)) / 2")]),
+    (E4, "premier pixel au lieu du centre de gravité", [(CENTRE, "cx, cy = pix[0]")]),
+    (E4, "argument modifié", [("    vu = np.zeros((h, w), bool)\n", ""), ("and not vu[i, j]", ""),
+                              ("and not vu[a, b]", ""), ("vu[i, j] = True", "masque[i, j] = 0"),
+                              ("vu[a, b] = True", "masque[a, b] = 0")]),
+    (E4, "masque comparé à 1", [("if masque[i, j] and", "if masque[i, j] == 1 and"),
+                                ("and masque[a, b] and", "and masque[a, b] == 1 and")]),
+    (E4, "aire_min ignorée", [(" or objets[0][0] < aire_min", "")]),
+    (E4, "autre chose que None", [("        return None", "        return (0, 0)")]),
+    (E4, "(aire, centre) au lieu du centre", [(BIG, "    return objets[0]\n")]),
+    (E4, "plus petite au lieu de la plus grande", [(BIG, "    return objets[-1][1]\n")]),
+    (K3, "angle pas replié", [("return replier(z - prevu)", "return z - prevu")]),
+    (K3, "angle pas replié", [(FOLD, "return a")]),
+    (K3, "angle pas replié", [("nu = innovation(z, self.H @ self.x)", "nu = z - self.H @ self.x")]),
+    (K3, "replié dans [0, 2π[", [(FOLD, "return a % (2 * np.pi)")]),
+    (K3, "signe de l'innovation", [("replier(z - prevu)", "replier(prevu - z)")]),
+    (K3, "degrés au lieu de radians", [(FOLD, "return (a + 180) % 360 - 180")]),
+]  # fmt: skip
+
+RECURSIVE = """
+import numpy as np
+
+def composantes(masque):
+    h, w = masque.shape
+    vu = np.zeros((h, w), bool)
+
+    def visiter(i, j, pix):
+        if 0 <= i < h and 0 <= j < w and masque[i, j] and not vu[i, j]:
+            vu[i, j] = True
+            pix.append((j, i))
+            for p, q in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                visiter(i + p, j + q, pix)
+        return pix
+
+    res = []
+    for i in range(h):
+        for j in range(w):
+            pix = visiter(i, j, [])
+            if pix:
+                res.append((len(pix), tuple(np.mean(pix, axis=0))))
+    return sorted(res, reverse=True)
+
+def plus_gros_objet(masque, aire_min):
+    objets = composantes(masque)
+    return objets[0][1] if objets and objets[0][0] >= aire_min else None
+"""
