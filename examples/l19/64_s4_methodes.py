@@ -121,8 +121,16 @@ def matching():
     return f"la moitié de faux couples : RANSAC à {off:.2f} px près"
 
 
-def dating():
-    return f"50 ms à 1 m/s : {100 * 0.05 * 1.0:.0f} cm"
+def dating(latency=0.05, speed=1.0):
+    t = 0.01 * np.arange(100)
+    seen = speed * (t - latency) + 1e-3 * RNG.standard_normal(100)  # ce que le capteur livre à l'instant t
+    now, truth = t[-1], speed * t[-1]
+    arrival, taken = (np.polyval(np.polyfit(stamps, seen, 1), now) - truth for stamps in (t, t - latency))
+    assert abs(arrival + latency * speed) < 0.002
+    assert abs(taken) < 0.002
+    return (
+        f"50 ms à 1 m/s : {100 * arrival:.1f} cm (datée à l'arrivée), {100 * abs(taken):.1f} cm (à la prise)"
+    )
 
 
 def too_small():
@@ -134,10 +142,11 @@ def too_small():
 
 
 def angle():
-    raw = 359 - -1
-    wrapped = 180 - (180 - raw) % 360
-    assert wrapped == 0
-    return f"359° - (-1°) = {raw}°, replié {wrapped}°"
+    a, b = RNG.uniform(-720, 720, (2, 1000))
+    wrapped = 180 - (180 - (a - b)) % 360
+    np.testing.assert_allclose(np.cos(np.radians(wrapped)), np.cos(np.radians(a - b)), atol=1e-9)
+    assert np.abs(wrapped).max() <= 180 < np.abs(a - b).max()
+    return f"mille différences : {np.abs(a - b).max():.0f}° au plus, repliées {np.abs(wrapped).max():.0f}°"
 
 
 def correlated(rho=0.6):
