@@ -87,9 +87,8 @@ def check_sigma_points():
     angles, weights = np.radians([180.0, 150.0, -150.0, 160.0, -160.0]), np.array([-99.0] + 4 * [25.0])
     naive = np.arctan2(weights @ np.sin(angles), weights @ np.cos(angles))
     mean = moyenne_circulaire(angles, weights)
-    print(
-        f"moyenne d'angles autour de 180° : {np.degrees(mean):.0f}° ; par atan2 : {abs(np.degrees(naive)):.0f}°"
-    )
+    mine, theirs = np.degrees(mean), abs(np.degrees(naive))
+    print(f"moyenne d'angles autour de 180° : {mine:.0f}° ; par atan2 : {theirs:.0f}°")
     assert np.isclose(abs(mean), np.pi)
     assert abs(naive) < 0.1
 
