@@ -57,7 +57,7 @@ def _pair_of_public() -> Pair:
 
 def _as_rows(given: Any, count: int) -> tuple[Array, str]:
     """Estimates (N,) or (N, 2), and what is wrong with them in one sentence."""
-    values = np.zeros(0)
+    values: Array = np.zeros(0)
     if given is None:
         return values, f"{ASKED} n'a rien renvoyé : un return oublié ?"
     if np.iscomplexobj(given):
