@@ -2,10 +2,12 @@
 
 Bruit : l'écart-type σ de 1000 mesures immobiles, et R = σ².  Biais : leur moyenne moins la vérité.  Dérive :
 la tendance sur une heure, et la pente selon la température.  Non-linéarité : un télémètre infrarouge suit
-1/d, une droite n'y suffit pas.  Résolution : le pas (LSB) ; moyenner 4 mesures gagne 1 bit, si le bruit
-dépasse un demi-pas.  Latence : la réponse à un échelon, à compenser dans le filtre.  Valeurs aberrantes :
-fréquence et amplitude, pour choisir la médiane ou le portillon.  Variance d'Allan : jusqu'à quand moyenner un
-gyromètre sert, et d'où vient Q.  Toutes ces réponses d'un coup : `factorlab characterize FICHIER --lang fr`.
+1/d, une droite n'y suffit pas : il faut un modèle inverse, ou une table.  Résolution : le pas (LSB) ;
+moyenner 4 mesures gagne 1 bit, si le bruit dépasse un demi-pas.  Latence : la réponse à un échelon, à
+compenser dans le filtre.  Valeurs aberrantes : fréquence et amplitude, pour choisir la médiane ou le
+portillon.  Variance d'Allan : jusqu'à quand moyenner un gyromètre sert, et d'où vient Q.
+
+Toutes ces réponses d'un coup : `factorlab characterize FICHIER --lang fr`.
 
 Avec FACTORLAB_DATA, le bruit est celui d'un vrai MPU-6050 ; les autres questions ont une vérité simulée.
 """

@@ -102,8 +102,8 @@ def draw(d, v, curve, need, places, seen):
     right.axhline(need, color="black", linewidth=0.8, linestyle=":", label=f"besoin : {need:g} cm")
     right.axvspan(*curve.useful_range(need), color="#d6ebe3", zorder=0, label="plage utile")
     right.set(xlabel="distance (cm)", ylabel="écart-type de d (cm)", title="σ croît comme d²", yscale="log")
-    right.set_ylim(0.01, 60)
-    right.legend(loc="upper left", ncols=2)
+    right.set_ylim(0.005, 10)
+    right.legend(loc="lower right", ncols=2)
     save(figure)
 
 
