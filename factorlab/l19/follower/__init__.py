@@ -2,6 +2,7 @@
 
 from factorlab.l19.follower.curves import CURVES, Track, track
 from factorlab.l19.follower.drive import Drive, simulate
+from factorlab.l19.follower.eye import BOTTOM, MIDDLE
 from factorlab.l19.follower.film import write_film
 from factorlab.l19.follower.follower import OFF_M, Follower, Reading, Step
 from factorlab.l19.follower.robot import CAMERA, MOUNT, PERIOD_S
@@ -9,10 +10,12 @@ from factorlab.l19.follower.settings import DETECTORS, LIMITS, FollowerSettings
 from factorlab.l19.follower.sweep import Sweep, sweep
 
 __all__ = [
+    "BOTTOM",
     "CAMERA",
     "CURVES",
     "DETECTORS",
     "LIMITS",
+    "MIDDLE",
     "MOUNT",
     "OFF_M",
     "PERIOD_S",

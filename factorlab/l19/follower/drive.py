@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from factorlab.l19.follower.eye import Detector
 from factorlab.l19.follower.follower import Follower
 from factorlab.l19.follower.settings import FollowerSettings
 
@@ -84,6 +85,7 @@ def simulate(
     settings: FollowerSettings | None = None,
     steps: int = 500,
     *,
+    detect: Detector | None = None,
     keep_images: bool = False,
     until_lost: bool = False,
 ) -> Drive:
@@ -92,10 +94,11 @@ def simulate(
     Parameters
     ----------
     steps : of 50 ms
+    detect : a detector of your own, as for `Follower`
     keep_images : all of what the camera saw, 2.4 kB a step
     until_lost : end with the first step at which the line is lost
     """
-    follower = Follower(settings)
+    follower = Follower(settings, detect)
     made = []
     for _ in range(steps):
         made.append(follower.step())

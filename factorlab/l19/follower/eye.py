@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,15 +12,17 @@ from numpy.typing import NDArray
 
 from factorlab.l19.follower.curves import WIDTH_M
 from factorlab.l19.follower.robot import CAMERA, ground
+from sequential.errors import DataError
 from vision3d.lines import LineReading, TwoRows, find_line, read_two_rows
 from vision3d.lines.settings import no_line
 
-__all__ = ["BOTTOM", "MIDDLE", "Sighting", "aheads", "on_ground", "read", "sight"]
+__all__ = ["BOTTOM", "MIDDLE", "Detector", "Sighting", "aheads", "on_ground", "read", "sight"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
+Detector = Callable[[Image], tuple[float, float] | None]
 BOTTOM, MIDDLE = 37, 20  # rows in the middle of the two bands
-THRESHOLD_PX = 1.0  # what a mean column of a thresholded row is believed to
+COLUMN_PX = 1.0  # what a column without a standard deviation is believed to
 FLOOR_M = 5e-4  # what the map and the bend of the line within a band leave
 
 
@@ -69,37 +72,58 @@ def widths() -> tuple[float, float]:
     return float(near), float(far)
 
 
-def read(image: Image, detector: str) -> LineReading:
-    """The line in an image, by one of three detectors: "bands", "threshold", "find_line"."""
+def read(image: Image, detector: str | Detector) -> LineReading:
+    """The line in an image, by "bands", "threshold" or "find_line", or by a function of your own.
+
+    Raises
+    ------
+    DataError
+        where the function gives neither two columns nor None.
+    """
+    if callable(detector):
+        return at_columns(detector(image))
     if detector == "find_line":
         return find_line(image)
     if detector == "threshold":
-        return by_threshold(image)
+        return at_columns(by_threshold(image))
     return read_two_rows(image, TwoRows(widths(), middle=MIDDLE / (CAMERA.size[1] - 1)))
 
 
-def by_threshold(image: Image) -> LineReading:
+def by_threshold(image: Image) -> tuple[float, float] | None:
     """What one tries first: Otsu's level, and the mean column of what is dark in each of two rows."""
     from vision3d.image import otsu
 
     dark = image <= otsu(image)
-    columns = [np.flatnonzero(dark[row]) for row in (BOTTOM, MIDDLE)]
-    if not all(len(one) for one in columns) or dark.mean() > 0.5:
-        return no_line("no row is dark in a part only")
-    bottom, ahead = (float(one.mean()) for one in columns)
-    lit = sum(float(np.ptp(one)) + 1.0 for one in columns)
-    width = dark.shape[1]
+    bottom, middle = (np.flatnonzero(dark[row]) for row in (BOTTOM, MIDDLE))
+    if not len(bottom) or not len(middle) or dark.mean() > 0.5:
+        return None
+    return float(bottom.mean()), float(middle.mean())
+
+
+def at_columns(columns: tuple[float, float] | None) -> LineReading:
+    """A reading from the line's columns, px, in the rows `BOTTOM` and `MIDDLE`; None for no line."""
+    if columns is None:
+        return no_line("the detector found none")
+    found = np.asarray(columns, dtype=np.float64)
+    if found.shape != (2,):
+        raise DataError(
+            f"a detector gives two columns, in rows {BOTTOM} and {MIDDLE}, or None; got {columns!r}"
+        )
+    if not np.isfinite(found).all():
+        return no_line("the detector found none")
+    bottom, ahead = found.tolist()
+    half = 0.5 * np.array(widths())
     return LineReading(
         found=True,
         bottom_px=(bottom, float(BOTTOM)),
         middle_px=(ahead, float(MIDDLE)),
-        cov_px=THRESHOLD_PX**2 * np.eye(2),
-        offset=(bottom - 0.5 * (width - 1)) / (0.5 * width),
-        heading_rad=float(np.arctan2(ahead - bottom, BOTTOM - MIDDLE)),
-        confidence=float(min(1.0, sum(widths()) / lit)),
+        cov_px=COLUMN_PX**2 * np.eye(2),
+        offset=(bottom - 0.5 * (CAMERA.size[0] - 1)) / (0.5 * CAMERA.size[0]),
+        heading_rad=math.atan2(ahead - bottom, BOTTOM - MIDDLE),
+        confidence=1.0,
         dark=True,
-        width_px=float(len(columns[0])),
-        edges_px=np.array([[BOTTOM, columns[0][0], columns[0][-1]], [MIDDLE, columns[1][0], columns[1][-1]]]),
+        width_px=widths()[0],
+        edges_px=np.column_stack([(BOTTOM, MIDDLE), found - half, found + half]),
         reason="",
         parts={},
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from factorlab.l19.follower.controller import Pid, PidMemory
 from factorlab.l19.follower.curves import track
 from factorlab.l19.follower.estimator import LOST_SIGMA, START_SIGMA, Localiser, mixed_rate
-from factorlab.l19.follower.eye import Sighting, aheads, read, sight
+from factorlab.l19.follower.eye import Detector, Sighting, aheads, read, sight
 from factorlab.l19.follower.robot import PERIOD_S, Drivetrain, along_arc, between, view
 from factorlab.l19.follower.settings import FollowerSettings
 from vision3d.lines import LineReading
@@ -81,10 +81,12 @@ class Follower:
     Parameters
     ----------
     settings : may be exchanged while it drives, with `change`
+    detect : instead of the settings' detector, a function of an image (40, 60) that gives the line's columns
+        in the rows `BOTTOM` and `MIDDLE`, px, or None where it sees none
     """
 
-    def __init__(self, settings: FollowerSettings | None = None) -> None:
-        self.settings = settings or FollowerSettings()
+    def __init__(self, settings: FollowerSettings | None = None, detect: Detector | None = None) -> None:
+        self.settings, self.detect = settings or FollowerSettings(), detect
         self.reset()
 
     @property
@@ -127,7 +129,7 @@ class Follower:
         own = self.settings
         poses = self._exposure()
         image = view().image(self.track.line, poses, rng=self.rng, noise=own.noise)
-        seen = read(image, own.detector)
+        seen = read(image, self.detect or own.detector)
         self.true_s, offset = self.track.nearest(self.pose, self.true_s)
         sighting = self._sighting(seen) if seen.found else None
         used = self._believe(sighting)

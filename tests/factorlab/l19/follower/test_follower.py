@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factorlab.l19.follower import DETECTORS, OFF_M, Follower, FollowerSettings, simulate
-from sequential.errors import ModelError
+from factorlab.l19.follower import BOTTOM, DETECTORS, MIDDLE, OFF_M, Follower, FollowerSettings, simulate
+from sequential.errors import DataError, ModelError
 
 
 def driven(follower, steps):
@@ -74,6 +74,24 @@ def test_every_detector_follows(detector):
     assert drive.kept
     assert drive.used.all()
     assert drive.rms_m < 0.02
+
+
+def test_a_detector_of_one_s_own_is_in_the_loop():
+    def darkest(image):
+        smooth = np.apply_along_axis(
+            np.convolve, 1, image[[BOTTOM, MIDDLE]].astype(float), np.ones(5), "valid"
+        )
+        return smooth.argmin(axis=1) + 2.0
+
+    drive = simulate(FollowerSettings(bridging_s=0.0), 100, detect=darkest)
+    assert drive.kept
+    assert drive.rms_m < 0.02
+    np.testing.assert_array_equal(drive.columns % 1.0, 0.0)
+    blind = simulate(FollowerSettings(), 40, detect=lambda _: None)
+    assert blind.lost[-1]
+    assert np.isnan(blind.columns).all()
+    with pytest.raises(DataError, match="two columns, in rows 37 and 20"):
+        simulate(FollowerSettings(), 1, detect=lambda _: 29.5)
 
 
 @pytest.mark.parametrize(
