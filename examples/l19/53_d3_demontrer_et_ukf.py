@@ -10,8 +10,8 @@
 
 3. UKF.  L'EKF remplace la fonction par sa tangente ; l'UKF garde la fonction et remplace la gaussienne
    par 2n + 1 points qui ont sa moyenne et sa covariance.  Les angles se moyennent sur le cercle.  Ici, sous
-   fort bruit et après 15 s à l'aveugle, l'EKF se perd dans 10 à 25 % des essais selon le tirage, l'UKF dans
-   1 à 4 % : bien mieux, mais pas infaillible.  Aucun des deux n'est alors honnête (NEES bien au-dessus de
+   fort bruit et après 15 s à l'aveugle, l'EKF se perd dans 13 à 25 % des essais selon le tirage, l'UKF dans
+   0,5 à 4,5 % : bien mieux, mais pas infaillible.  Aucun des deux n'est alors honnête (NEES bien au-dessus de
    3).  Sous faible bruit ils font jeu égal.
 
 Toutes les démonstrations, et l'histoire de l'article de 1960, sont dans docs/derivations.fr.md ; chacune de

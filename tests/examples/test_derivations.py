@@ -60,6 +60,33 @@ def test_every_formula_can_be_drawn(page, formulas):
         assert "\\" not in drawn, f"{latex}: a command is not known"
 
 
+@pytest.mark.slow
+def test_the_table_of_both_filters_is_measured():
+    """Within the last digit that the page shows, or what another machine's rounding does to lost runs."""
+    from factorlab.l19.contest import LOST_M, contest
+
+    measured = []
+    for noise in ("strong", "weak"):
+        drawn = contest(200, noise=noise)
+        for name in ("ekf", "ukf"):
+            late = drawn.nees[name][drawn.worst(name) <= LOST_M][:, drawn.late].mean() / 3
+            lost, rmse, honesty = 100 * drawn.lost(name), drawn.rmse(name), drawn.anees(name).mean / 3
+            measured.append((lost, rmse, honesty, late))
+    for page in PAGES.values():
+        text = page.read_text(encoding="utf-8")
+        rows = re.findall(r"^\| (?:fort|faible|strong|weak) \| [EU]KF \|(.*)\|$", text, re.MULTILINE)
+        told = [
+            [float(re.search(r"[\d.,]+", c)[0].replace(",", ".")) for c in row.split("|")] for row in rows
+        ]
+        for row, (lost, rmse, honesty, late) in zip(told, measured, strict=True):
+            assert row == [
+                pytest.approx(lost, abs=2.0),
+                pytest.approx(rmse, rel=0.1),
+                pytest.approx(honesty, rel=0.3),
+                pytest.approx(late, rel=0.1),
+            ]
+
+
 def test_no_line_ends_inside_a_formula():
     for page in PAGES.values():
         for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
