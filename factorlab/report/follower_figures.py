@@ -17,8 +17,8 @@ __all__ = ["journey_figure"]
 Array = NDArray[np.float64]
 TRACK, TRUTH, GUESS, ODOMETRY, AIM = "#b8bec4", "#0072B2", "#D55E00", "#666666", "#009E73"
 AIM_CM = 2.0
-SPACE_M = 0.5  # of line before and behind the way
-TALLEST, FLATTEST = 0.55, 0.12  # height of the map, as shares of its width
+LONG_M, SPACE_M = 4.0, 0.5  # of a line; of it before and behind the way
+TALLEST, FLATTEST = 0.45, 0.12  # height of the map, as shares of its width
 
 
 def journey_figure(table: Mapping[str, Array], line: Array) -> Figure:
@@ -59,9 +59,12 @@ def journey_figure(table: Mapping[str, Array], line: Array) -> Figure:
 
 
 def _near(line: Array, table: Mapping[str, Array]) -> Array:
-    """The part of a line along which the robot drove."""
+    """Of a long line the part along which the robot drove."""
+    if np.ptp(line[:, 0]) < LONG_M:
+        return line
     low, high = table["x_m"].min() - SPACE_M, table["x_m"].max() + SPACE_M
-    return line[(line[:, 0] >= low) & (line[:, 0] <= high)]
+    inside: Array = line[(line[:, 0] >= low) & (line[:, 0] <= high)]
+    return inside
 
 
 def _shade_lost(axes: Axes, table: Mapping[str, Array]) -> None:

@@ -109,8 +109,8 @@ def test_a_signal_ends_it_properly(tmp_path, number):
     ("options", "words"),
     [
         (("--bruit", "300"), "Bruit de l'image : attendu entre 0 et 200 niveaux de gris, reçu 300"),
-        (("--flou", "-5"), "Flou de bougé : attendu entre 0 et 500 ms, reçu -5"),
-        (("--kp", "nan"), "Kp : attendu entre 0 et 60"),
+        (("--flou", "-5"), "Flou de bougé : attendu entre 0 et 1000 ms, reçu -5"),
+        (("--kp", "nan"), "Kp : attendu entre 0 et 150"),
         (("--seed", "-1"), "la graine doit être un entier positif ou nul"),
         (("--vite",), "--vite demande une fin"),
         (("--steps", "5", "--duree", "2"), "disent la même chose"),

@@ -91,7 +91,7 @@ def test_a_wish_that_cannot_be_met_is_a_sentence_in_french(follower):
     _, server = follower(start=False)
     status, told = tell(server, {"do": "set", "settings": {"kp": 700}})
     assert status == 409
-    assert told["fault"] == "Kp : attendu entre 0 et 60 rad/s par m, reçu 700"
+    assert told["fault"] == "Kp : attendu entre 0 et 150 rad/s par m, reçu 700"
     for wish in ({"do": "explode"}, [], {}, {"do": "set", "settings": {"kp": "fort"}}, {"do": "pace"}):
         status, told = tell(server, wish)
         assert (status, told["fault"]) == (409, "la commande n'a pas été comprise")

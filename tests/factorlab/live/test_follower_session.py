@@ -169,8 +169,8 @@ def test_sliders_are_those_of_the_simulator():
     [
         ({"bruit": 3}, "il n'y a pas de réglage 'bruit', seulement noise, blur_s"),
         ({"noise": -1}, "Bruit de l'image : attendu entre 0 et 200 niveaux de gris, reçu -1"),
-        ({"blur_s": 0.6}, "Flou de bougé : attendu entre 0 et 500 ms, reçu 600"),
-        ({"kp": math.nan}, "Kp : attendu entre 0 et 60"),
+        ({"blur_s": 1.2}, "Flou de bougé : attendu entre 0 et 1000 ms, reçu 1200"),
+        ({"kp": math.nan}, "Kp : attendu entre 0 et 150"),
         ({"curve": "huit"}, "curve : il n'y a pas de 'huit', seulement " + ", ".join(CURVES)),
         ({"seed": -3}, "la graine doit être un entier positif ou nul"),
     ],

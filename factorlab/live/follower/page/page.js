@@ -145,13 +145,15 @@ function showHeadline({ journey, step, paused, ended, fault }) {
 }
 
 function advise(settings) {
-  const { noise, blur_s: blur, speed_m_s: speed, kp } = settings;
+  const { noise, blur_s: blur, speed_m_s: speed, kp, bridging_s: blind, detector } = settings;
   const tries = [];
-  if (noise > 40) tries.push("baissez le bruit de l'image");
-  if (blur * speed > 0.03) tries.push("baissez le flou ou la vitesse");
+  const limit = detector === "bands" ? (blind > 0.3 ? 110 : 80) : 25; // grey levels, about
+  if (noise >= limit) tries.push("baissez le bruit de l'image");
+  if (detector !== "bands" && noise > 0) tries.push("choisissez le filtre adapté");
+  if (blur > 0.3) tries.push("baissez le flou");
+  if (kp < 22 * speed) tries.push("montez Kp : à cette vitesse, le robot ne tourne pas assez");
   if (speed > 0.5) tries.push("ralentissez");
-  if (kp < 4) tries.push("montez Kp : le robot ne tourne pas assez");
-  if (kp > 35) tries.push("baissez Kp, ou ajoutez du Kd : le robot oscille");
+  if (blind < 0.3) tries.push("laissez-lui le temps de rouler sans voir");
   if (!tries.length) tries.push("revenez aux réglages d'origine, puis ne changez qu'une chose à la fois");
   return `Le robot s'est arrêté. Essayez : ${tries.join(" ; ")}. S'il revoit la ligne, il repart ; sinon, « Recommencer » (R).`;
 }
