@@ -15,7 +15,7 @@
    3).  Sous faible bruit ils font jeu égal.
 
 Toutes les démonstrations, et l'histoire de l'article de 1960, sont dans docs/derivations.fr.md ; chacune de
-leurs formules est vérifiée par 54_d3_formules.py.
+leurs formules est vérifiée par 54_d3_formules_filtre.py et 55_d3_formules_capteurs.py.
 """
 
 from dataclasses import replace
