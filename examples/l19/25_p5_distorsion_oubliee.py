@@ -26,7 +26,7 @@ from vision3d.calibrate.detection import detect_views
 from vision3d.camera import Camera
 from vision3d.images import read_images
 from vision3d.render import render_set
-from vision3d.robust import transfer
+from vision3d.robust import fit_homography, transfer
 
 SQUARE_MM = 25.0
 BOARD = Checkerboard(9, 6, square_m=SQUARE_MM / 1000)
@@ -45,18 +45,9 @@ def photographs():
     return render_set(TRUE, BOARD, 12, np.random.default_rng(25)).named(), "simulé"
 
 
-def homography(pixels, mm):
-    """L'homographie (3, 3) qui mène quatre pixels à quatre points du plan."""
-    rows = []
-    for (u, v), (x, y) in zip(pixels, mm, strict=True):
-        rows += [[u, v, 1, 0, 0, 0, -x * u, -x * v, -x], [0, 0, 0, u, v, 1, -y * u, -y * v, -y]]
-    scale = np.linalg.norm(rows, axis=0)
-    return (np.linalg.svd(np.array(rows) / scale)[2][-1] / scale).reshape(3, 3)
-
-
 def measure(pixels):
     """Erreur (mm), (54, 2), des coins mesurés par l'homographie des quatre extrêmes."""
-    to_mm = homography(pixels[CORNERS], GRID_MM[CORNERS])
+    to_mm = fit_homography(pixels[CORNERS], GRID_MM[CORNERS]).model
     return transfer(to_mm, pixels) - GRID_MM
 
 
