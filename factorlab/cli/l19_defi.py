@@ -27,12 +27,13 @@ __all__ = ["defi"]
     help="D'autres enregistrements cachés (pour l'enseignant).  [défaut : ceux du cours]",
 )
 @click.option(
-    "--limite",
+    "--duree",
+    "limit_s",
     type=click.FloatRange(1, 600),
     default=60.0,
     show_default=True,
     metavar="S",
-    help="Temps accordé au fichier.",
+    help="Durée accordée au fichier, en secondes.",
 )
 @as_json
 @click.option(
@@ -49,7 +50,7 @@ def defi(
     *,
     au_moins: float | None,
     seed: int | None,
-    limite: float,
+    limit_s: float,
     as_json: bool,
     out: Path | None,
     force: bool,
@@ -73,7 +74,7 @@ def defi(
     from factorlab.l19.challenge.trials import HIDDEN_SEED, public_trial
 
     seed = HIDDEN_SEED if seed is None else seed
-    judged = judge_rivals(seed) if file is None else judge_file(file, seed, limite)
+    judged = judge_rivals(seed) if file is None else judge_file(file, seed, limit_s)
     deliver(
         challenge_document(judged, command_line()),
         as_json=as_json,

@@ -71,7 +71,7 @@ def judged(tmp_path, text, *options):
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_file_is_told_why(tmp_path, name):
     text, told = WRONG[name]
-    limit = ("--limite", "3") if name == "endless" else ()
+    limit = ("--duree", "3") if name == "endless" else ()
     done = judged(tmp_path, text, "--json", *limit)
     assert done.exit_code == 3, done.output
     document = json.loads(done.stdout)
