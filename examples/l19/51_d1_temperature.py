@@ -1,7 +1,8 @@
 """D1 (★). Régler un Kalman comme un ingénieur : une température, rampe puis palier, 1 Hz, σ = 0,5 °C.
 
 Une mesure aberrante de +8 °C tombe à t = 40 s.  État : (température, pente).  On compare avec un
-passe-bas et une médiane : temps pour faire 90 % d'un échelon, et erreur RMS.
+passe-bas et une médiane : temps pour faire 90 % d'un échelon, et erreur RMS.  Sans pente dans l'état, ces
+deux-là traînent pendant toute la rampe ; le Kalman, lui, croit encore à la pente après le coude, et dépasse.
 
 Procédure de réglage, pour n'importe quel capteur :
  1. Laisser le capteur immobile ; enregistrer au moins 30 s et 30 mesures.
@@ -82,7 +83,7 @@ def main():
     from claims import claim, table
     from figures import out_folder, say
 
-    print("\n".join(__doc__.splitlines()[5:]))
+    print("\n".join(__doc__.splitlines()[6:]))
     z = TRIAL.z
     R = np.var(z[TRIAL.rest], ddof=1)
     q = tune_q(z, R)

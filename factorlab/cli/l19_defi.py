@@ -22,6 +22,8 @@ __all__ = ["defi"]
 )
 @click.option(
     "--seed",
+    "--graine",
+    "seed",
     type=click.IntRange(min=0),
     metavar="N",
     help="D'autres enregistrements cachés (pour l'enseignant).  [défaut : ceux du cours]",

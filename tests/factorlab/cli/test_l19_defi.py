@@ -151,7 +151,7 @@ def test_a_score_below_what_is_asked_is_3(tmp_path):
 
 def test_another_seed_is_another_score(tmp_path):
     scores = {json.loads(judged(tmp_path, SMOOTHED, "--json", *s).stdout)["filter"]["ramp_rms_c"]
-              for s in ((), ("--seed", "5"))}  # fmt: skip
+              for s in ((), ("--graine", "5"))}  # fmt: skip
     assert len(scores) == 2
 
 
