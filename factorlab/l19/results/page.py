@@ -26,6 +26,7 @@ class Work:
     ----------
     outcomes : of the scripts that ran, in the order of the course
     pictures : by script stem, paths as the page links to them
+    sources : by script name, where the page links to for the script itself
     name : whose work it is; empty for the project's own
     recordings : the student's own files, by the id of the item that read them
     whole : whether every item of the course was asked for, so that a missing file is a fault
@@ -34,6 +35,7 @@ class Work:
 
     outcomes: Sequence[Outcome]
     pictures: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
     name: str = ""
     recordings: Mapping[str, Sequence[str]] = field(default_factory=dict)
     whole: bool = True
@@ -99,9 +101,13 @@ def _overview(work: Work) -> Iterable[str]:
     for item in COURSE:
         for one in work.outcomes:
             if one.item == item.id:
-                yield _row((f"**{item.id}**", f"`{one.script.name}`", *_headline(one)))
+                yield _row((f"**{item.id}**", _file(one.script.name, work.sources), *_headline(one)))
         if item.id in missing:
             yield _row((f"**{item.id}**", "–", item.title, "–", "–", "–", MISSING))
+
+
+def _file(name: str, sources: Mapping[str, str]) -> str:
+    return f"[`{name}`]({sources[name]})" if name in sources else f"`{name}`"
 
 
 def _headline(outcome: Outcome) -> tuple[str, ...]:
@@ -117,9 +123,9 @@ def _headline(outcome: Outcome) -> tuple[str, ...]:
 
 def cells(claim: Claim) -> tuple[str, ...]:
     """A claim under `CLAIM_HEADINGS`."""
-    unit = f" {claim.unit}" if claim.unit else ""
-    band = band_text(claim.low, claim.high)
-    return (claim.quantity, number_text(claim.value) + unit, band, claim.source, verdict_of(claim))
+    space = "" if claim.unit in {"", "°"} else " "
+    value = f"{number_text(claim.value)}{space}{claim.unit}"
+    return (claim.quantity, value, band_text(claim.low, claim.high), claim.source, verdict_of(claim))
 
 
 def verdict_of(claim: Claim) -> str:

@@ -56,10 +56,16 @@ def read_results(path: Path) -> list[Row]:
     return sorted(rows, key=lambda row: row.script)
 
 
+def _split(written: str) -> tuple[str, str]:
+    """Value and unit: `3,2 °/s`, `4,5°`, `7`."""
+    value = written.partition(" ")[0].removesuffix("°")
+    return value, written.removeprefix(value).strip()
+
+
 def _row(script: str, cells: tuple[str, ...], where: str) -> Row:
     try:
         quantity, written, band, source, _ = cells
-        value, _, unit = written.partition(" ")
+        value, unit = _split(written)
         low, high = band_of(band)
         claim = Claim(item_of(script) or "", quantity, number_of(value), unit, low, high, source)
     except ValueError as error:

@@ -59,7 +59,9 @@ def write_results(work: Work, out: Path, images: Path | None = None) -> Path:
     links = {
         one.script.stem: [_link(folder / path.name, page) for path in _shown(one)] for one in work.outcomes
     }
-    text = results_page(replace(work, pictures=links))
+    beside = [one.script for one in work.outcomes if _below(one.script, page)]
+    sources = {script.name: _link(script, page) for script in beside}
+    text = results_page(replace(work, pictures=links, sources=sources))
     folder.parent.mkdir(parents=True, exist_ok=True)
     page.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".resultats-", dir=folder.parent) as temporary:
@@ -79,8 +81,13 @@ def _shown(outcome: Outcome) -> Sequence[Path]:
     return outcome.pictures if part_of(outcome.item) in PICTURED else ()
 
 
-def _link(picture: Path, page: Path) -> str:
-    return Path(os.path.relpath(picture.absolute(), page.absolute().parent)).as_posix()
+def _link(path: Path, page: Path) -> str:
+    return Path(os.path.relpath(path.absolute(), page.absolute().parent)).as_posix()
+
+
+def _below(script: Path, page: Path) -> bool:
+    """Whether the page's folder holds the script, so that whoever has the one has the other."""
+    return script.resolve().is_relative_to(page.resolve().parent)
 
 
 def _linked(page: Path) -> set[Path]:

@@ -46,6 +46,7 @@ def test_every_claim_is_read_back(tmp_path):
     rows = read_results(page(tmp_path, K1, TP))
     judged = [claim for one in (K1, TP) for claim in one.claims if not claim.is_time]
     assert [row.claim for row in rows] == judged
+    assert rows[-1].written == "1,4°"
     assert [row.script for row in rows] == [K1.script.name] * 3 + [TP.script.name]
 
 

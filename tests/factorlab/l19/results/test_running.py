@@ -72,9 +72,12 @@ def test_the_page_and_its_pictures(course, tmp_path):
     (file,) = (tmp_path / "rendu" / "figures").iterdir()
     assert f"](figures/{file.name})" in text
     assert file.stat().st_size < 120_000, "noise is the worst case"
+    assert "`05_k1_bon.py`" in text
+    assert "](../cours" not in text, "what is handed in does not link to what is not"
     # a page elsewhere than its pictures, then one without: the old picture goes
     page = write_results(Work(found, whole=False), tmp_path / "R.md", tmp_path / "docs" / "images")
     assert "](docs/images/41_tp1_image.png)" in page.read_text(encoding="utf-8")
+    assert "[`05_k1_bon.py`](cours/05_k1_bon.py)" in page.read_text(encoding="utf-8")
     assert (tmp_path / "docs" / "images" / "41_tp1_image.png").is_file()
     (tmp_path / "docs" / "images" / "autre.png").write_bytes(b"kept")
     bare = [replace(one, pictures=()) for one in found]
