@@ -16,7 +16,7 @@ __all__ = ["check"]
 @click.argument("fichiers", nargs=-1, required=True, metavar="FICHIER.py|DOSSIER …",
                 type=click.Path(path_type=Path))  # fmt: skip
 @click.option("--tout", is_flag=True, help="Montrer toutes les erreurs, et non les trois premières.")
-@click.option("--duree", "limit_s", type=click.FloatRange(min=1.0), default=60.0, show_default=True,
+@click.option("--duree", "limit_s", type=click.FloatRange(min=1.0), default=120.0, show_default=True,
               metavar="S", help="Durée accordée à chaque fichier, en secondes.")  # fmt: skip
 @as_json
 @in_one_sentence

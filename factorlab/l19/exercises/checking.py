@@ -77,7 +77,7 @@ class FileVerdict:
         }
 
 
-def check_path(path: Path, *, limit_s: float = 60.0) -> list[FileVerdict]:
+def check_path(path: Path, *, limit_s: float = 120.0) -> list[FileVerdict]:
     """Check a file, or every file of a folder that defines names of an exercise.
 
     Raises
@@ -104,11 +104,14 @@ def check_path(path: Path, *, limit_s: float = 60.0) -> list[FileVerdict]:
     return [check_file(one, limit_s=limit_s)]
 
 
-def check_file(found: Survey, *, limit_s: float = 60.0) -> FileVerdict:
+def check_file(found: Survey, *, limit_s: float = 120.0) -> FileVerdict:
     """Run a file in a process of its own and judge the exercises that it answers."""
     if found.fault is not None:
         return FileVerdict(found.path, (), syntax=found.fault)
-    arguments = {"path": str(found.path.resolve()), "exercises": list(found.exercises)}
+    arguments = {
+        "path": str(found.path.resolve()),
+        "exercises": {exercise: found.offered(exercise) for exercise in found.exercises},
+    }
     run = run_student(found.path, JOB, arguments, limit_s=limit_s)
     exercises = tuple(ExerciseVerdict(e, _findings(found, run, e)) for e in found.exercises)
     return FileVerdict(found.path, exercises, None, run.stopped, run.printed)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from factorlab.l19.exercises.finding import Sheet, shown
+from factorlab.l19.exercises.finding import Cause, Sheet, shown
 from factorlab.l19.exercises.innovation_readings import NIS, Parts, misread, read_innovation
 from factorlab.l19.exercises.kalman_diagnosis import (
     close,
@@ -25,6 +25,8 @@ from factorlab.l19.exercises.signatures import misspelt, signature_fault
 __all__ = ["NAMES", "check"]
 
 NAMES = ("Kalman", "nis_moyen")
+# right for the one command and the one measurement of the statement
+HARMLESS = {"division au lieu de l'inverse", "produit élément par élément"}
 METHODS = {"predire": ("u",), "corriger": ("z",)}
 TITLES = {
     ("predire", "x"): "predire : l'état x = F x + B u",
@@ -108,7 +110,7 @@ def _all_right(d: Drive) -> bool:
 def _tell_fault(sheet: Sheet, d: Drive) -> None:
     assert d.fault is not None  # noqa: S101 - for the type checker
     lines = example_lines(d.system, d.style, sheet.module, "corriger" if d.at == "corriger" else "predire")
-    sheet.stumbled(d.at.partition("(")[0], f"{d.at} se termine", d.fault, example=lines)
+    sheet.stumbled(d.at.partition("(")[0], f"{d.at} va jusqu'au bout", d.fault, example=lines)
 
 
 def _judge(sheet: Sheet, drives: list[Drive], kind: str, part: str) -> bool:
@@ -179,31 +181,38 @@ def _tell_wrong(sheet: Sheet, drives: list[Drive], kind: str, part: str, d: Driv
 
 def _several(sheet: Sheet, drives: list[Drive]) -> None:
     """Two measurements at once: transposes and divisions show."""
-    title = "plusieurs mesures à la fois"
+    title = "plusieurs mesures et commandes à la fois"
     for d in (d for d in drives if d.system in (TWO, THREE)):
         if _all_right(d):
             continue
         wrong = [s for s in d.stages if not (_half_right(d.system, s, "x") and _half_right(d.system, s, "P"))]
-        kind = wrong[0].kind if wrong else "corriger"
-        causes = (correction_causes(drives) if kind == "corriger" else (predicted_cause(drives, "P"),)) or (
-            None,
-        )
-        lines = example_lines(d.system, d.style, sheet.module, kind)
-        if causes[0] is not None and causes[0].name == "division au lieu de l'inverse":
-            said = "Juste pour une mesure ; avec deux, `/ S` divise case par case : écrivez np.linalg.inv(S)."
-            sheet.remark("mesures", title, said, example=lines)
+        kind = wrong[0].kind if wrong else d.at
+        what = "commande" if kind == "predire" else "mesure"
+        more = {"example": example_lines(d.system, d.style, sheet.module, kind)}
+        cause = _cause_of_several(drives, d, kind, wrong)
+        said = f"Juste pour une {what} ; avec deux, le résultat est faux."
+        if cause is not None and cause.name in HARMLESS:
+            sheet.remark("mesures", title, f"{said} Cause : {cause.name} ; {cause.mend}", **more)
         elif wrong:
             x, _ = right_after(d.system, wrong[0])
-            sheet.wrong("mesures", title, "Juste pour une mesure, faux pour deux.", causes[0], example=lines,
-                        expected=f"kf.x = {shown(x)}", got=f"kf.x = {shown(wrong[0].after_x)}")  # fmt: skip
+            shown_x = {"expected": f"kf.x = {shown(x)}", "got": f"kf.x = {shown(wrong[0].after_x)}"}
+            sheet.wrong("mesures", title, said, cause, **more, **shown_x)
         else:
             assert d.fault is not None  # noqa: S101 - for the type checker
             where = f" (ligne {d.fault.line})" if d.fault.line else ""
-            sheet.remark("mesures", title, f"Juste pour une mesure ; avec deux, {d.at} s'arrête{where} : "
-                         f"{d.fault.said}. np.linalg.inv(S) et @ marchent pour toutes les tailles.",
-                         example=lines)  # fmt: skip
+            said = f"Juste pour une {what} ; avec deux, {kind} s'arrête{where} : {d.fault.said}."
+            sheet.remark(
+                "mesures", title, f"{said} np.linalg.inv(S) et @ marchent pour toutes les tailles.", **more
+            )
         return
     sheet.passed("mesures", title)
+
+
+def _cause_of_several(drives: list[Drive], d: Drive, kind: str, wrong: list[Any]) -> Cause | None:
+    if kind == "corriger":
+        return next(iter(correction_causes(drives) or ()), None)
+    part = "P" if wrong and _half_right(d.system, wrong[0], "x") else "x"
+    return predicted_cause(drives, part) if wrong else None
 
 
 def _check_returned(sheet: Sheet, drives: list[Drive], *, trusted: bool) -> str | None:

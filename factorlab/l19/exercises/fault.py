@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import linecache
+import re
 import traceback
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -29,6 +30,9 @@ GLOSSES: tuple[tuple[type[BaseException], str, str], ...] = (
     (FileNotFoundError, "", "le fichier n'est pas dans le dossier de votre programme"),
     (SystemExit, "", "le programme s'arrête de lui-même (sys.exit, quit)"),
 )  # fmt: skip
+
+
+GUFUNC = re.compile(r", with gufunc signature .*?\)(?= \(size)")  # NumPy's own words for a product
 
 
 class TooLongError(BaseException):
@@ -96,10 +100,10 @@ def fault_of(error: BaseException, path: Path, limit_s: float = 0.0) -> Fault:
         return Fault(
             "durée", f"toujours pas fini après {limit_s:g} s : une boucle sans fin ?", line, code, file
         )
-    kind, text = type(error).__name__, " ".join(str(error).split())
+    kind, text = type(error).__name__, GUFUNC.sub("", " ".join(str(error).split()))
     gloss = next((g for t, part, g in GLOSSES if isinstance(error, t) and part in text), "")
     said = f"{kind}{f' : {text}' if text else ''}"
-    return Fault(kind, f"{said} ({gloss})" if gloss else said, line, code, file)
+    return Fault(kind, f"{said} — {gloss}" if gloss else said, line, code, file)
 
 
 def _line_of(error: BaseException, path: Path) -> tuple[int | None, str, str]:

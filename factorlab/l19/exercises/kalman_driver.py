@@ -63,6 +63,8 @@ class Driver:
         self.kf = call(made, *system.arguments(style))
         self.state = self._named(STATE_NAMES, system.x0)
         self.cov = self._named(COV_NAMES, system.P0)
+        self.first = self.state, self.cov
+        self.foreseen: tuple[str, str] | None = None
 
     def predict(self, u: Array) -> Stage:
         """Call predire(u)."""
@@ -102,7 +104,9 @@ class Driver:
 
     def _follow(self, x: Array, P: Array, before: dict[str, Array]) -> None:
         """Some keep the prediction under another name, and only corriger changes x and P."""
-        self.first = self.state, self.cov
+        if self.foreseen is not None:
+            self.state, self.cov = self.foreseen
+            return
         after_x, after_P = self.read()
         if not (np.array_equal(after_x, x) and np.array_equal(after_P, P)):
             return
@@ -113,6 +117,12 @@ class Driver:
                 self.state = name
             elif value.size == P.size:
                 self.cov = name
+        if self.first[0] != self.state and self.first[1] != self.cov:
+            self.foreseen = self.state, self.cov
+
+
+def _in_shape(system: System, stage: Stage) -> bool:
+    return stage.after_x.shape == (system.n,) and stage.after_P.shape == (system.n, system.n)
 
 
 def _array(value: Any) -> Array | None:
@@ -141,8 +151,12 @@ def drive(made: Any, call: Caller, system: System, style: str) -> Drive:
         for u, z in zip(system.commands, system.measurements, strict=True):
             at = "predire"
             stages.append(driver.predict(u))
+            if not _in_shape(system, stages[-1]):
+                break  # nothing can be said about what follows
             at = "corriger"
             stages.append(driver.correct(z))
+            if not _in_shape(system, stages[-1]):
+                break
     except Stumble as stumble:
         return Drive(system, style, tuple(stages), stumble.fault, at)
     except (TypeError, ValueError) as error:  # a state that is no array any more

@@ -55,6 +55,8 @@ PREDICTED_COV: dict[Cause, Callable[[System, Array], Array]] = {
         lambda s, P: s.F @ P @ s.F.T + s.Q**2,
     Cause("produit élément par élément", "`*` multiplie case par case ; le produit de matrices est @."):
         lambda s, P: s.F * P * s.F.T + s.Q,
+    Cause("produit élément par élément, sans transposer", "le produit de matrices est @ : F @ P @ F.T + Q."):
+        lambda s, P: s.F * P * s.F + s.Q,
 }  # fmt: skip
 
 INNOVATION_COV: dict[Cause, Callable[[System, Array], Array]] = {

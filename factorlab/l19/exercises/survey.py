@@ -36,6 +36,10 @@ class Survey:
     exercises: tuple[str, ...] = ()
     fault: Fault | None = None
 
+    def offered(self, exercise: str) -> list[str]:
+        """Names of an exercise that the file defines."""
+        return [name for name in {**EXERCISES, **OPTIONAL}[exercise] if name in self.names]
+
     def missing(self, exercise: str) -> dict[str, str]:
         """Names of an exercise that the file lacks, each with what may have been meant."""
         return {

@@ -89,5 +89,21 @@ def test_a_folder_is_checked_file_by_file(check, tmp_path):
     assert "autre.py" not in done.output
 
 
+@pytest.mark.parametrize(
+    ("example", "exercise"),
+    [
+        ("31_e1_kalman", "E1"),
+        ("32_e2_median_et_sauts", "E2"),
+        ("33_e3_capteur_ir", "E3"),
+        ("34_e4_composantes", "E4"),
+    ],
+)
+def test_our_own_solutions_pass_without_a_remark(example, exercise):
+    done = CliRunner().invoke(main, ["l19", "check", str(EXAMPLES / f"{example}.py"), "--json"])
+    assert done.exit_code == 0, done.output
+    (verdict,) = json.loads(done.stdout)["files"][0]["exercises"]
+    assert (verdict["exercise"], verdict["verdict"]) == (exercise, "PASS"), verdict
+
+
 def test_the_command_is_told_how_to_be_used(check):
     assert CliRunner().invoke(main, ["l19", "check"]).exit_code == 2

@@ -116,3 +116,31 @@ def test_the_reference_is_honest():
         kf.predire(u)
         nis.append(kf.corriger(z))
     assert np.mean(nis) == pytest.approx(1.0, abs=0.08)
+
+
+def test_a_mean_that_squares_is_right_for_a_filter_that_does_not(changed):
+    done = changed(
+        COLUMNS, ("innovation = z - np.dot(self.H, self.x)", "innovation = np.dot(self.H, self.x) - z")
+    )
+    assert done.causes == {"signe de l'innovation"}, done
+    assert "nis_moyen" in {f.check for f in done.of("PASS")}
+
+
+def test_one_command_times_b_is_enough_for_the_statement(changed):
+    done = changed(COLUMNS, ("np.dot(self.B, u).reshape(-1, 1)", "self.B * u"))
+    assert done.verdict == "WARN", done
+    assert any("produit élément par élément" in f.said for f in done.of("WARN"))
+
+
+def test_a_file_that_stops_before_the_class_says_so(checked):
+    done = checked("n = int(input('combien ? '))\n" + PLAIN)
+    assert done.file.stopped.kind == "EOFError"
+    assert all("pas encore défini" in f.said for f in done.of("FAIL"))
+
+
+@pytest.mark.parametrize("name", ["etoile", "scalar"])
+def test_stars_instead_of_products_are_called_by_name(checked, name):
+    text = (
+        PLAIN.replace(" @ ", " * ") if name == "etoile" else PLAIN.replace(" @ ", " * ").replace("F.T", "F")
+    )
+    assert any(cause.startswith("produit élément par élément") for cause in checked(text).causes)
