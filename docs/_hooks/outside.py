@@ -57,14 +57,19 @@ ORIGINS = {place(path): path for path in written()}
 
 def on_config(config):
     """The course, in French, and the examples: what there is of them."""
-    course = [path for path in ("l19/index.md", "l19/resultats.md") if path in ORIGINS]
+    course = ["l19/index.md"]
     course += [path.removeprefix("docs/") for path in relative(ROOT.glob("docs/l19*.md"))]
     course += [path.removeprefix("docs/") for path in relative(ROOT.glob("docs/l19/*.md"))]
     course += [path.removeprefix("docs/") for path in relative(ROOT.glob("docs/derivations*.md"))]
-    course += sorted(uri for uri in ORIGINS if uri.startswith("l19/") and uri not in course)
+    course += sorted((uri for uri in ORIGINS if uri.startswith("l19/") and uri not in course), key=last)
     config.nav.append({"Cours L19": course})
     config.nav.append({"Project": ["contributing.md", "changelog.md", "firmware_source.md"]})
     return config
+
+
+def last(uri):
+    """The results behind everything else."""
+    return uri == place("RESULTATS.md"), uri
 
 
 def on_files(files, config):
@@ -154,3 +159,10 @@ def on_page_content(content, page, config, files):
         return found[0] if target is None else f'<a href="{target.url_relative_to(page.file)}">{found[0]}</a>'
 
     return EXAMPLE.sub(linked, content)
+
+
+def on_post_page(output, page, config):
+    """Say which pages are French."""
+    uri = page.file.src_uri
+    french = uri.startswith(("l19", "examples/l19/")) or uri.endswith(".fr.md")
+    return output.replace('<html lang="en"', '<html lang="fr"', 1) if french else output

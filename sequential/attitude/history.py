@@ -33,6 +33,7 @@ class AttitudeHistory:
 
     The world is ENU: x east, y (magnetic) north, z up.  Quaternions are (w, x, y, z), Hamilton, and turn body
     coordinates into world coordinates.  A covariance belongs to δ in R = R̂ exp(δ), the body (right) chart.
+    Arrays are copied, unless they are read-only already (see `read_only`).
 
     Parameters
     ----------
@@ -45,8 +46,6 @@ class AttitudeHistory:
     rest : (N,) where the estimator held the sensor to be at rest
     magnetic_disturbance : (N,) where it did not trust the magnetometer
     name : of the estimator
-
-    Arrays are copied, unless they are read-only already (see `read_only`).
 
     Raises
     ------

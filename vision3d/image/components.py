@@ -74,7 +74,7 @@ def connected_components(
     connectivity : 4 neighbours that share a side, or 8 that share at least a corner
     method : "union-find" passes twice over the image, "breadth-first" floods from each new pixel; same answer
     backend : "compiled" or "opencv"; "numpy" takes the compiled loops, since each step depends on the one
-    before
+        before
 
     Raises
     ------

@@ -58,10 +58,8 @@ def erode(image: ArrayLike, element: ArrayLike | int = 3, **options: Any) -> Ima
     ----------
     image : (h, w) or (h, w, channels)
     element : from `structuring_element`, or the side of a square
-    iterations : times, 1 unless given
-    border : "constant" unless given, and then what lies outside never wins, unless `value` says what it is
-    value : of the constant border
-    backend : "compiled", "numpy" or "opencv"
+    **options : `iterations`, 1 unless given; `border`, "constant" unless given, and then what lies outside
+        never wins, unless `value` says what it is; `backend`, "compiled", "numpy" or "opencv"
     """
     return _morphed(image, element, largest=False, **options)
 

@@ -65,7 +65,7 @@ class GraphFile:
     ----------
     where : the file, for messages
     axes : 2, poses (x, y, heading), or 3, poses (qw, qx, qy, qz, x, y, z)
-    poses, landmarks : values of the vertices, kinds "x" and "l" of `vertices`
+    vertices : values of the poses (kind "x") and of the landmarks (kind "l")
     between : pose against pose
     displacements : landmarks in the frame of a pose, (x, y) or (x, y, z), m
     sightings : (range, bearing) of landmarks, m, rad; in the plane only
