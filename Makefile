@@ -26,14 +26,15 @@ pip_install = if [ -x $(BIN)/pip ]; then $(BIN)/python -m pip install $(PIP_FLAG
 	else $(PYTHON) -m pip --python $(BIN)/python install $(PIP_FLAGS) $(1); fi
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-opencv4 packages check docs bench warm clean
+.PHONY: help demo test test-opencv4 packages check docs site bench warm clean
 
 help:
 	@echo "make demo    install, then compare filters and smoothers on a real drive; ends with the report's path"
 	@echo "make test    install everything, then run the whole suite"
 	@echo "make test-opencv4  tests of images and cameras once more, on OpenCV 4"
 	@echo "make check   lint, format, types and import contracts"
-	@echo "make docs    pictures, results of the course and pages; opens from build/site/index.html"
+	@echo "make docs    pictures, results of the course and pages, which open from build/site/index.html"
+	@echo "make site    the pages alone"
 	@echo "make bench   every benchmark, and the slow tests with all their seeds"
 	@echo "make clean   remove .venv, builds and caches"
 
@@ -59,7 +60,16 @@ check: $(VENV)/installed-test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: $(VENV)/installed-test
+# Pictures and the course's results are made from real recordings: without them they stay as they are.
+docs: $(VENV)/installed-test warm
+	@if [ -n "$$FACTORLAB_DATA" ]; then \
+		for script in docs/_make/*.py; do $(ONE_THREAD) $(BIN)/python $$script || exit 1; done; \
+		$(ONE_THREAD) $(BIN)/factorlab l19 rapport -o RESULTATS.md --images docs/resultats \
+			--readme examples/l19/README.md --force; \
+	else echo "FACTORLAB_DATA is not set: pictures and RESULTATS.md stay as they are"; fi
+	@$(MAKE) --no-print-directory site
+
+site: $(VENV)/installed-test
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "open $(CURDIR)/build/site/index.html"
 

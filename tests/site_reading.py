@@ -19,6 +19,7 @@ NOTES = [
 LOADING = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src", "embed": "src"}
 FENCED = re.compile(r"^```(?P<language>\w*)[^\n]*\n(?P<text>.*?)^```", re.DOTALL | re.MULTILINE)
 INDENTED = re.compile(r"(?<=\n\n)(?:(?: {4}.*)?\n)+")
+LINK = re.compile(r"(?:\]\(|src=\")([^)\s\"]+)")
 SPAN = re.compile(r"(?<!`)`(factorlab [^`\n]+)`(?!`)")
 
 
@@ -68,6 +69,13 @@ def landing(page, link):
     parts = urlsplit(link)
     target = (page.path.parent / unquote(parts.path)).resolve() if parts.path else page.path.resolve()
     return target, unquote(parts.fragment)
+
+
+def linked_files(note):
+    """The files that a Markdown page links to or shows."""
+    text = re.sub(r"`[^`\n]*`", "", FENCED.sub("\n", note.read_text(encoding="utf-8")))
+    targets = [one.split("#")[0] for one in LINK.findall(re.sub(r"\n\n(?: {4}.*\n+)+", "\n\n", text))]
+    return [(note.parent / one).resolve() for one in targets if one and not is_elsewhere(one)]
 
 
 def blocks(text):

@@ -9,10 +9,21 @@ import sys
 
 import pytest
 from chromium import Chromium
-from site_reading import NOTES, ROOT, Page, command_lines, faults_of, is_elsewhere, landing, python_blocks
+from site_reading import (
+    NOTES,
+    ROOT,
+    Page,
+    command_lines,
+    faults_of,
+    is_elsewhere,
+    landing,
+    linked_files,
+    python_blocks,
+)
 
 from factorlab.cli import main
 
+LARGEST = 120_000  # bytes of a picture
 SERVED = "404.html"  # shown by servers only, with addresses from their top
 PHONE = {"width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": True}
 
@@ -110,7 +121,12 @@ def test_lists_and_tables_are_read_as_such(pages):
     assert not text
 
 
-@pytest.mark.parametrize("note", [pytest.param(path, id=str(path.relative_to(ROOT))) for path in NOTES])
+every_note = pytest.mark.parametrize(
+    "note", [pytest.param(path, id=str(path.relative_to(ROOT))) for path in NOTES]
+)
+
+
+@every_note
 def test_commands_shown_exist(note):
     lines = command_lines(note.read_text(encoding="utf-8"))
     assert not {line: faults for line in lines if (faults := faults_of(line, main))}
@@ -126,7 +142,21 @@ def test_a_command_that_does_not_exist_is_noticed():
     ]
 
 
-@pytest.mark.parametrize("note", [pytest.param(path, id=str(path.relative_to(ROOT))) for path in NOTES])
+@every_note
+def test_files_that_are_linked_exist(note):
+    missing = [target for target in linked_files(note) if not target.exists()]
+    made = [ROOT / "docs" / "api", ROOT / "docs" / "commands"]  # while the site is built, which checks them
+    assert not [target for target in missing if target.parent not in made]
+
+
+def test_pictures_are_shown_and_small():
+    shown = {target.name for note in NOTES for target in linked_files(note)}
+    pictures = sorted((ROOT / "docs" / "pictures").iterdir())
+    assert not [path.name for path in pictures if path.name not in shown]
+    assert not {path.name: path.stat().st_size for path in pictures if path.stat().st_size > LARGEST}
+
+
+@every_note
 def test_python_shown_is_python(note):
     for code in python_blocks(note.read_text(encoding="utf-8")):
         ast.parse(code)
@@ -146,6 +176,18 @@ def test_opens_from_the_disk_and_finds(window, site):
     window.call("Input.insertText", text="gyro bias")
     assert window.until("document.querySelectorAll('.md-search-result__item').length > 3")
     assert not [line for line in window.console if "error" in line.lower()]
+    assert not [address for address in window.asked if is_elsewhere(address)]
+
+
+def test_formulas_are_drawn(window, site):
+    """A fraction is higher than the line that it stands in: nothing had to be fetched to draw it."""
+    window.visit((site / "derivations.html").as_uri())
+    heights = window.run("[...document.querySelectorAll('mfrac')].map(f => f.getBoundingClientRect().height)")
+    line = window.run("document.querySelector('article p').getClientRects()[0].height / 3")
+    assert len(heights) > 10
+    assert min(heights) > 0
+    assert max(heights) > line
+    assert "$" not in window.run("document.querySelector('article').innerText")
     assert not [address for address in window.asked if is_elsewhere(address)]
 
 

@@ -58,7 +58,10 @@ PICTURES = (
 
 def main():
     """Make the pictures, or those that are named."""
-    wanted = set(sys.argv[1:]) or {picture.name for picture in PICTURES}
+    known = {picture.name for picture in PICTURES}
+    wanted = set(sys.argv[1:]) or known
+    if unknown := wanted - known:
+        raise SystemExit(f"no picture is called {', '.join(unknown)}; there are {', '.join(sorted(known))}")
     reports = {}
     for picture in PICTURES:
         if picture.name not in wanted:
