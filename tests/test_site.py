@@ -173,7 +173,10 @@ def test_opens_from_the_disk_and_finds(window, site):
     window.call("Emulation.setFocusEmulationEnabled", enabled=True)
     window.visit((site / "index.html").as_uri())
     window.run("document.querySelector('[data-md-component=search-query]').focus()")
-    window.call("Input.insertText", text="gyro bias")
+    assert window.until("document.querySelector('.md-search-result__meta').innerText.startsWith('Type')")
+    window.call("Input.insertText", text="gyro bia")
+    for kind in ("keyDown", "keyUp"):
+        window.call("Input.dispatchKeyEvent", type=kind, key="s", text="s" if kind == "keyDown" else "")
     assert window.until("document.querySelectorAll('.md-search-result__item').length > 3")
     assert not [line for line in window.console if "error" in line.lower()]
     assert not [address for address in window.asked if is_elsewhere(address)]
