@@ -2,6 +2,7 @@
 
 import click
 
+from factorlab.cli.french import FrenchGroup
 from factorlab.cli.l19_check import check
 from factorlab.cli.l19_defi import defi
 from factorlab.cli.l19_rapport import rapport
@@ -10,7 +11,7 @@ from factorlab.cli.l19_suiveur import suiveur
 __all__ = ["l19"]
 
 
-@click.group(short_help="The course L19, « Perception » (in French).")
+@click.group(cls=FrenchGroup, short_help="The course L19, « Perception » (in French).")
 def l19() -> None:
     """Le cours L19, « Perception » : exercices, défis, robot suiveur de ligne, compte rendu."""
 

@@ -32,8 +32,8 @@ SCALES = {"flou": 1e-3}
 OPTIONS = (
     click.option("--courbe", type=click.Choice(CURVES), default="circuit", show_default=True,
                  help="La ligne à suivre."),
-    click.option("--bruit", type=float, metavar="σ", help="Bruit de l'image, niveaux de gris.  [0]"),
-    click.option("--flou", type=float, metavar="MS", help="Flou : ouverture de l'obturateur, ms.  [0]"),
+    click.option("--bruit", type=float, metavar="σ", help="Bruit de l'image, niveaux de gris.  [défaut : 0]"),
+    click.option("--flou", type=float, metavar="MS", help="Ouverture de l'obturateur, ms.  [défaut : 0]"),
     click.option("--vitesse", type=float, metavar="M/S", help="Vitesse du robot."),
     click.option("--kp", type=float, help="Gain proportionnel, rad/s par m."),
     click.option("--ki", type=float, help="Gain intégral, rad/s par m·s."),
@@ -45,7 +45,7 @@ OPTIONS = (
     click.option("--detecteur", type=click.Choice(DETECTORS), help="Ce qui cherche la ligne dans l'image."),
     click.option("--seed", "--graine", "seed", type=int, default=0, show_default=True, help="Du hasard."),
     click.option("--steps", "--pas", "steps", type=click.IntRange(1, 100_000), metavar="N",
-                 help="Finir après N pas de 50 ms.  [par défaut : à Ctrl-C]"),
+                 help="Finir après N pas de 50 ms.  [défaut : à Ctrl-C]"),
     click.option("--duree", type=click.FloatRange(min=0.05), metavar="S", help="La même chose en secondes."),
     click.option("--vite", is_flag=True, help="Aussi vite que possible, avec --steps ou --duree."),
     click.option("--port", type=click.IntRange(0, 65535), default=PORT, show_default=True,
@@ -71,7 +71,7 @@ def suiveur(**options: Any) -> int:
     """Montrer le robot suiveur de ligne (défi D2) sur une page de cet ordinateur.
 
     Le bruit de l'image, le flou de bougé, la vitesse et les gains du PID sont des curseurs : le robot roule
-    pendant qu'on les déplace.  Jusqu'où tient-il ?  Ctrl-C termine ; avec -o, le dernier trajet est écrit.
+    pendant qu'on les déplace.  Où perd-il la ligne ?  Ctrl-C termine ; avec -o, le dernier trajet est écrit.
     """
     from contextlib import ExitStack
 
@@ -107,7 +107,7 @@ def suiveur(**options: Any) -> int:
         files=files,
     )
     if session.fault:
-        click.echo(f"error: {session.fault}", err=True)
+        click.echo(f"erreur : {session.fault}", err=True)
     return DATA_ERROR if session.fault else code
 
 
