@@ -126,7 +126,7 @@ def main():
     axes[4].legend()
     draw_errors(axes[5], noisy)
     save(figure)
-    print(f"film : {write_film(out_folder() / '52_d2_suiveur.gif', drive, 10)}")
+    print(f"film : {write_film(out_folder() / '52_d2_suiveur.gif', drive, 5, faster=3.0)}")
 
     claim("D2", "écart latéral RMS sur 500 pas, sans bruit", 100 * drive.rms_m, "cm", high=1.0)
     for name, low, high in (("seuil et moyenne", 15, 40), ("bandes", 60, 110), ("bandes et EKF", 80, 130)):

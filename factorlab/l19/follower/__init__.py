@@ -1,4 +1,10 @@
-"""The line follower of challenge D2, simulated end to end: a line, a camera, a detector, a filter, a PID."""
+"""The line follower of challenge D2, simulated end to end: a line, a camera, a detector, a filter, a PID.
+
+drive = simulate(FollowerSettings(curve="slalom", noise=40.0))       # 500 steps of 50 ms, as arrays
+follower = Follower()                                                # or one step at a time
+follower.step().offset_m
+sweep([80.0, 100.0, 120.0]).noise_limit()                            # up to which noise it keeps the line
+"""
 
 from factorlab.l19.follower.curves import CURVES, Track, track
 from factorlab.l19.follower.drive import Drive, simulate

@@ -42,8 +42,8 @@ def frames(drive: Drive, every: int = 1) -> Iterator[Picture]:
         yield np.hstack([_map(drive, k), _camera(drive, k)])
 
 
-def write_film(path: Path, drive: Drive, every: int = 1) -> Path:
-    """Write a film in the drive's own time: .avi (Motion JPEG) or .gif.
+def write_film(path: Path, drive: Drive, every: int = 1, *, faster: float = 1.0) -> Path:
+    """Write a film, .avi (Motion JPEG) or .gif, in the drive's own time or some times faster.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def write_film(path: Path, drive: Drive, every: int = 1) -> Path:
     """
     from vision3d.render import write_video
 
-    seconds = every * PERIOD_S
+    seconds = every * PERIOD_S / faster
     if path.suffix == ".avi":
         return write_video(path, frames(drive, every), 1.0 / seconds)
     if path.suffix != ".gif":
