@@ -25,12 +25,15 @@ def test_frames_show_map_and_camera(filmed):
 
 @pytest.mark.parametrize("ending", [".avi", ".gif"])
 def test_files_hold_every_frame(filmed, ending, tmp_path):
-    path = write_film(tmp_path / f"film{ending}", filmed, 3)
+    path = write_film(tmp_path / f"film{ending}", filmed, 3, faster=2.0)
     if ending == ".gif":
         with Image.open(path) as film:
             assert film.n_frames == 4
+            assert film.info["duration"] in (70, 75, 80)  # ms; a GIF counts hundredths of a second
     else:
-        assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 4
+        film = cv2.VideoCapture(str(path))
+        assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 4
+        assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(2.0 / 0.15, rel=1e-3)
 
 
 def test_refuses_other_endings_and_drives_without_images(filmed, tmp_path):
