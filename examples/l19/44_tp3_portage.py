@@ -180,7 +180,8 @@ def draw_jitter(b, board):
         return
     jitter = board[0].jitter[2:] * 1e6
     b.plot(np.arange(len(jitter)) * 0.01, jitter, ".", markersize=2, color=figures.BLUE)
-    b.axhspan(-8, 8, color="#eeeeee", zorder=0)
+    b.axhspan(-8, 8, color="#eeeeee", zorder=0, label="tolérance : ±8 µs")
+    b.legend(loc="upper right")
 
 
 def draw_budget(c, boards):

@@ -70,12 +70,10 @@ def main():
     draw_uncertainty(axes[3], poor, "quatre images presque de face : écart-type (px)")
     save(figure)
 
-    headings = ("paramètre", "vérité (simulée)", "trouvé", "σ", *([source, "σ"] if real else []))
-    table("K et distorsion (fx, fy, cx, cy en pixels)", headings, [
-        [name, true, found, sigma, *([real.camera.parameters[k], real.std[k]] if real else [])]
-        for k, (name, true, found, sigma) in enumerate(
-            zip(good.names, TRUE.parameters, good.camera.parameters, good.std, strict=True))
-    ])  # fmt: skip
+    headings = ("paramètre", "vérité (simulée)", "trouvé ± σ", *([f"{source} ± σ"] if real else []))
+    found = [told(good), *([told(real)] if real else [])]
+    rows = zip(good.names, TRUE.parameters, *found, strict=True)
+    table("K et distorsion (fx, fy, cx, cy en pixels)", headings, list(map(list, rows)))
     error = np.max(np.abs(good.camera.intrinsics - TRUE.intrinsics) / good.std[:4])
     if real is not None:
         # le résultat publié par OpenCV pour ses photos : 0,39 px, fenêtre de coins trop grande
@@ -86,6 +84,13 @@ def main():
     claim("TP4a", "images jamais vues / vues : rapport des résidus", cross.rms_px / good.rms_px, high=1.1)
     claim("TP4a", "quatre images de face / vingt : résidus", poor.rms_px / good.rms_px, high=1.2)
     claim("TP4a", "quatre images de face / vingt : σ de la focale", poor.std[0] / good.std[0], low=5.0)
+
+
+def told(calibration):
+    """Chaque paramètre avec son écart-type, deux chiffres à celui-ci."""
+    for value, sigma in zip(calibration.camera.parameters, calibration.std, strict=True):
+        digits = max(0, 1 - int(np.floor(np.log10(sigma))))
+        yield f"{value:.{digits}f} ± {sigma:.{digits}f}".replace(".", ",").replace("-", "−")
 
 
 def photos():
@@ -128,7 +133,7 @@ def draw_uncertainty(axes, found, title):
     levels = [0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1, 2, 5, 10]
     axes.contourf(x, y, np.log10(np.clip(sure.map_px, 0.01, 10)), levels=np.log10(levels))
     lines = axes.contour(x, y, sure.map_px, levels=levels, colors="white", linewidths=0.7)
-    axes.clabel(lines, fmt="%g")
+    axes.clabel(lines, levels=levels[::2], fmt="%g")  # une sur deux : les coins sont serrés
     axes.plot(*np.concatenate([view.pixels for view in found.views]).T, ".", color="white", markersize=1.5)
     axes.set(title=title, xlabel="x (px)", ylabel="y (px)", ylim=(479.5, -0.5), aspect="equal")
     axes.grid(visible=False)

@@ -12,7 +12,7 @@ from sequential.errors import FileFormatError
 
 __all__ = ["Claim", "read_claims"]
 
-TIME_UNITS = {"s", "ms", "µs", "ns", "images/s", "fois le temps réel"}
+TIME_UNITS = {"s", "ms", "µs", "ns", "1/s", "Hz", "images/s", "×"}
 
 
 @dataclass(frozen=True, slots=True)

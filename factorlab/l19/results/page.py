@@ -149,10 +149,15 @@ def _section(outcome: Outcome, pictures: Sequence[str]) -> list[str]:
 
 def _table(table: Table) -> Iterable[str]:
     names = [h if isinstance(h, str) else f"{h[0]} ({h[1]})" for h in table.headings]
-    right = [any(isinstance(row[k], int | float) for row in table.rows) for k in range(len(names))]
+    right = [all(_is_number(row[k]) for row in table.rows) for k in range(len(names))]
     yield from table_lines(names, right)
     for row in table.rows:
         yield _row([c if isinstance(c, str) else number(None) if c is None else number_text(c) for c in row])
+
+
+def _is_number(cell: str | float | None) -> bool:
+    """A number, or words that begin with one."""
+    return not isinstance(cell, str) or cell[:1].isdigit() or cell[:1] in "<≥≤−–"
 
 
 def _times(outcomes: Sequence[Outcome]) -> Iterable[str]:

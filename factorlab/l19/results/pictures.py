@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 __all__ = ["small_png"]
 
 WIDTH_PX, MOST_BYTES = 1000, 60_000
-STEPS = ((1.0, 96), (1.0, 48), (0.85, 40), (0.72, 32), (0.6, 24), (0.5, 16))  # of the width, and colours
+STEPS = ((1.0, 96), (1.0, 48), (0.85, 40), (0.72, 32), (0.6, 24), (0.5, 24))  # of the width, and colours
 # the colours of lines stay whatever the photographs of a figure need: Okabe and Ito's, black, white, grey
 KEPT = "000000 ffffff 9a9a9a 0072b2 d55e00 009e73 cc79a7 56b4e9 b07c00"
 
 
 def small_png(path: Path) -> bytes:
-    """The picture as a palette PNG of at most about 60 kB: fewer colours and smaller until it is."""
+    """The picture as a palette PNG of about 60 kB (a photograph: 100): fewer colours and smaller until then."""
     from PIL import Image
 
     with Image.open(path) as opened:

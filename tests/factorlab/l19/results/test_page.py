@@ -59,7 +59,7 @@ def test_times_stand_apart(tmp_path):
 def test_tables_and_pictures_of_the_practical_work(tmp_path):
     text = page(tmp_path, TP, pictures={TP.script.stem: ["figures/a.png"]}).read_text(encoding="utf-8")
     assert "## TP4b. Marqueurs ArUco et pose" in text
-    assert "| axe | σ (m/s²) | N |\n|---|--:|---|\n| ax | 0,03 | – |" in text
+    assert "| axe | σ (m/s²) | N |\n|---|--:|--:|\n| ax | 0,03 | – |" in text
     assert "![Figure de 46_tp4b_marqueurs](figures/a.png)" in text
 
 
