@@ -18,7 +18,7 @@ KEPT = "000000 ffffff 9a9a9a 0072b2 d55e00 009e73 cc79a7 56b4e9 b07c00"
 
 
 def small_png(path: Path) -> bytes:
-    """The picture as a palette PNG of about 60 kB (a photograph: 100): fewer colours and smaller until then."""
+    """The picture as a palette PNG of about 60 kB, 100 where it holds photographs."""
     from PIL import Image
 
     with Image.open(path) as opened:
