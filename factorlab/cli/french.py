@@ -9,6 +9,8 @@ from typing import IO, Any
 
 import click
 
+from factorlab.typography import bound
+
 __all__ = ["FrenchContext", "FrenchFormatter", "FrenchGroup", "french"]
 
 HELP = {
@@ -62,11 +64,6 @@ def _replaced(text: str, pairs: Iterable[tuple[str, str]]) -> str:
     return text
 
 
-def _bound(text: str) -> str:
-    """No line begins with « : ; ? ! »."""
-    return re.sub(r" ([:;?!»])", "\u00a0\\1", text.replace("« ", "«\u00a0"))
-
-
 class FrenchFormatter(click.HelpFormatter):
     """Help with French headings, and with French words for what click and shared options say."""
 
@@ -82,14 +79,13 @@ class FrenchFormatter(click.HelpFormatter):
     def write_dl(self, rows: Iterable[tuple[str, str]], col_max: int = 30, col_spacing: int = 2) -> None:
         """Options or commands, each with what it is for."""
         told = [
-            (_replaced(name, KINDS), _bound(_replaced(HELP.get(words, words), EXTRAS)))
-            for name, words in rows
+            (_replaced(name, KINDS), bound(_replaced(HELP.get(words, words), EXTRAS))) for name, words in rows
         ]
         super().write_dl(told, col_max, col_spacing)
 
     def write_text(self, text: str) -> None:
         """A paragraph."""
-        super().write_text(_bound(text))
+        super().write_text(bound(text))
 
 
 class FrenchContext(click.Context):

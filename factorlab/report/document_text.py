@@ -8,6 +8,7 @@ from textwrap import wrap
 from factorlab.compare.text import WIDTH
 from factorlab.report.document import Document, Table, Verdict
 from factorlab.report.words import WORDS, Language, interval, number
+from factorlab.typography import bound
 
 __all__ = ["document_lines"]
 
@@ -16,7 +17,7 @@ def document_lines(document: Document) -> Iterable[str]:
     """Title and lead, tables, verdicts last, where the eye is when a terminal has stopped scrolling."""
     yield document.title
     if document.lead:
-        yield from wrap(document.lead, WIDTH)
+        yield from _wrapped(document.lead)
     yield ""
     for section in document.sections:
         if section.table is not None and not section.page_only:
@@ -27,7 +28,14 @@ def document_lines(document: Document) -> Iterable[str]:
         yield from _verdict(one, document.lang)
     if document.conclusion:
         yield ""
-        yield from wrap(document.conclusion, WIDTH)
+        yield from _wrapped(document.conclusion)
+
+
+def _wrapped(text: str, indents: tuple[str, str] = ("", "")) -> Iterable[str]:
+    """Lines of words, none of which begins with a « : » or a « ? » of French."""
+    first, rest = indents
+    for line in wrap(bound(text), WIDTH, initial_indent=first, subsequent_indent=rest):
+        yield line.replace("\u00a0", " ")
 
 
 def _verdict(one: Verdict, lang: Language) -> Iterable[str]:
@@ -35,9 +43,9 @@ def _verdict(one: Verdict, lang: Language) -> Iterable[str]:
     limits = f"  [{interval(one.band, lang)}]" if one.band else ""
     unit = f" {one.unit}" if one.unit and one.value is not None else ""
     yield f"{WORDS[lang].badges[one.verdict]}  {one.metric}{value}{limits}{unit}"
-    yield from wrap(one.meaning, WIDTH, initial_indent="      ", subsequent_indent="      ")
+    yield from _wrapped(one.meaning, (6 * " ", 6 * " "))
     if one.action:
-        yield from wrap(f"-> {one.action}", WIDTH, initial_indent="      ", subsequent_indent="         ")
+        yield from _wrapped(f"-> {one.action}", (6 * " ", 9 * " "))
 
 
 def table_lines(table: Table, lang: Language = "en") -> Iterable[str]:

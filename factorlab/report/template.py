@@ -6,6 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from factorlab.typography import bound
+
 __all__ = ["fill"]
 
 
@@ -17,5 +19,11 @@ def fill(template: str, **values: Any) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_bound if values.get("lang") == "fr" else None,
     )
     return environment.get_template(template).render(**values)
+
+
+def _bound(value: Any) -> Any:
+    """Words of a French page; drawings and numbers stay as they are."""
+    return bound(value) if type(value) is str else value

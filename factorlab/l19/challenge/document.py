@@ -80,7 +80,7 @@ def _ours(judged: Judged) -> Row:
 
 def _conclusion(judged: Judged) -> str:
     if judged.fault:
-        return f"Pas encore de note : {judged.fault}."
+        return f"Pas encore de note : {judged.fault}" + ("" if judged.fault.endswith((".", "?")) else ".")
     if judged.row is None:
         return BEGIN
     score, parts = points(judged.row.score), sorted(judged.row.parts, key=lambda part: part.points - part.of)
