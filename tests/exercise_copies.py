@@ -185,9 +185,25 @@ class KalmanAngle:
         return nu / np.sqrt(S[0, 0])
 """
 
+D3 = """
+import numpy as np
+
+def points_sigma(x, P, kappa):
+    n = len(x)
+    L = np.linalg.cholesky((n + kappa) * P)
+    points = [x]
+    for i in range(n):
+        points.append(x + L[:, i])
+        points.append(x - L[:, i])
+    poids = [kappa / (n + kappa)] + 2 * n * [1 / (2 * (n + kappa))]
+    return np.array(points), np.array(poids)
+"""
+
 RIGHT = {
     "E2": E2, "E2 naïf": E2_NAIVE, "E2 listes": E2_LISTS, "E3": E3, "E3 scipy": E3_SCIPY, "E3 dict": E3_DICT,
-    "E4": E4, "E4 lignes": E4_ROWS, "E4 plat": E4_FLAT, "K3": K3,
+    "E4": E4, "E4 lignes": E4_ROWS, "E4 plat": E4_FLAT, "K3": K3, "D3": D3,
+    "D3 colonnes": D3.replace("np.array(points),", "np.array(points).T,"),
+    "D3 sans poids": D3.replace("return np.array(points), np.array(poids)", "return points"),
 }  # fmt: skip
 
 MEDIAN = "np.median(x[max(0, i - h):i + h + 1])"
@@ -270,6 +286,15 @@ WRONG = [
     (K3, "signe de l'innovation", [("replier(z - prevu)", "replier(prevu - z)")]),
     (K3, "degrés au lieu de radians", [(FOLD, "return (a + 180) % 360 - 180")]),
 ]  # fmt: skip
+
+WRONG += [
+    (D3, "facteur n + κ oublié", [("(n + kappa) * P", "P")]),
+    (D3, "n au lieu de n + κ", [("cholesky((n + kappa) * P)", "cholesky(n * P)")]),
+    (D3, "lignes au lieu des colonnes de la racine", [("L[:, i]", "L[i]")]),
+    (D3, "racine élément par élément", [("np.linalg.cholesky", "np.sqrt")]),
+    (D3, "poids", [("1 / (2 * (n + kappa))", "1 / (n + kappa)")]),
+    (D3, "return oublié", [("return", "resultat =")]),
+]
 
 RECURSIVE = """
 import numpy as np

@@ -20,6 +20,7 @@ ROOMS = {
     "E3": "factorlab.l19.exercises.e3_infrared",
     "E4": "factorlab.l19.exercises.e4_components",
     "K3": "factorlab.l19.exercises.k3_angle",
+    "D3": "factorlab.l19.exercises.d3_sigma_points",
 }
 
 

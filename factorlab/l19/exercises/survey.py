@@ -24,6 +24,7 @@ OPTIONAL: dict[str, tuple[str, ...]] = {
         *("innovation", "innovation_angle", "difference_angle", "ecart_angle"),
         *("KalmanAngle", "EKF", "KalmanEtendu"),
     ),
+    "D3": ("points_sigma",),
 }
 
 

@@ -15,6 +15,7 @@ TITLES = {
     "E3": "capteur infrarouge",
     "E4": "composantes connexes",
     "K3": "angles repliés (facultatif)",
+    "D3": "points sigma (facultatif)",
 }
 WORDS = {PASS: "juste", WARN: "juste, avec des remarques", FAIL: "à corriger"}
 COLOURS = {PASS: "green", WARN: "green", FAIL: "red"}

@@ -8,7 +8,7 @@ from exercise_copies import E2, E2_NAIVE, E3, E4, E4_FLAT, E4_ROWS, RECURSIVE, R
 def test_a_right_solution_passes(checked, solution):
     done = checked(solution)
     assert done.verdict != "FAIL", done
-    assert done.of("PASS")
+    assert done.of("PASS") or done.of("WARN")
 
 
 @pytest.mark.parametrize(
