@@ -21,7 +21,7 @@ def figures(*, quick: bool = False) -> dict[str, Figure]:
     """Seconds of the whole command on a right and on a wrong E1, and shares of the tables of the tests."""
     sys.path.insert(0, str(TESTS))  # the copies that the tests check
     from exercise_copies import RIGHT as OTHERS_RIGHT
-    from exercise_copies import WRONG as OTHERS_WRONG
+    from exercise_mistakes import WRONG as OTHERS_WRONG
     from kalman_copies import PLAIN, RIGHT, WRONG
 
     rows = {}

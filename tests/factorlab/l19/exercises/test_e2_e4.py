@@ -1,7 +1,8 @@
 """E2, E3, E4 and K3: right solutions of several tastes pass, wrong ones are called by name."""
 
 import pytest
-from exercise_copies import E2, E2_NAIVE, E3, E4, E4_FLAT, E4_ROWS, RECURSIVE, RIGHT, WRONG
+from exercise_copies import E2, E2_NAIVE, E3, E4, E4_FLAT, E4_ROWS, RECURSIVE, RIGHT
+from exercise_mistakes import WRONG
 
 
 @pytest.mark.parametrize("solution", RIGHT.values(), ids=RIGHT)
