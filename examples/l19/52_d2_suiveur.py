@@ -82,9 +82,9 @@ def against_compiled(drive, count=12):
 
 
 LOOPS = {
-    "seuil et moyenne": (FollowerSettings(detector="threshold", bridging_s=0.0), (15, 20, 40)),
-    "bandes": (FollowerSettings(bridging_s=0.0), (60, 80, 110)),
-    "bandes et EKF": (FollowerSettings(), (80, 100, 130)),
+    "seuil et moyenne": (FollowerSettings(detector="threshold", bridging_s=0.0), (20, 25, 30)),
+    "bandes": (FollowerSettings(bridging_s=0.0), (80, 95, 110)),
+    "bandes et EKF": (FollowerSettings(), (100, 115, 130)),
 }
 
 
