@@ -14,7 +14,7 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "l19").glob("2?_p?_*.py"))
-WIDTH, COLOURS = 1000, 192
+WIDTH, COLOURS = 1000, 256
 
 
 def main():
@@ -27,7 +27,8 @@ def main():
             subprocess.run(run, cwd=ROOT, env=own, check=True, stdout=subprocess.DEVNULL)
             drawn = Image.open(Path(folder, f"{example.stem}.png")).convert("RGB")
         small = drawn.resize((WIDTH, round(WIDTH * drawn.height / drawn.width)), Image.Resampling.LANCZOS)
-        small.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+        few = small.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few.save(target, optimize=True)
         print(f"{target.relative_to(ROOT)}  {target.stat().st_size / 1000:.0f} kB")
 
 
