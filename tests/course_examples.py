@@ -19,7 +19,7 @@ def claim(item, quantity, value, unit="", low=None, high=None, source="simulé")
 def example(folder, name, *lines):
     """Write one example; `claim` and `out` are there."""
     path = Path(folder) / name
-    path.write_text(PART + "\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text('"""Un exemple."""' + PART + "\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 

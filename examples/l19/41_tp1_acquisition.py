@@ -10,7 +10,6 @@ Sans fichier : le vrai MPU-6050 immobile de FACTORLAB_DATA (449 s), sinon un enr
 """
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -43,9 +42,9 @@ NOISE = ImuNoise(gyro_density=1.6e-4, accel_density=3.6e-3, gyro_bias_walk=6e-6,
 
 def record(rng, minutes=10.0):
     """Votre fichier, le vrai capteur, ou dix minutes simulées suivies d'un mouvement ; et ce que c'est."""
-    given = next((name for name in sys.argv[1:] if Path(name).is_file()), None)
-    if given is not None:
-        sys.argv.remove(given)
+    from figures import files_given
+
+    for given in files_given():
         return read_imu(given), Path(given).name
     folder = os.environ.get("FACTORLAB_DATA")
     real = Path(folder or "") / "imu/mpu6050/example_data_tinit_calc.csv"

@@ -15,7 +15,6 @@ calibration n'a pas vue : chacune est prédite par les autres.  Données : MPU-6
 """
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -55,9 +54,9 @@ def simulated(attitudes, rng):
 
 def record(rng):
     """Vos positions, celles du vrai capteur, ou dix positions simulées ; et ce que c'est."""
-    given = next((name for name in sys.argv[1:] if Path(name).is_file()), None)
-    if given is not None:
-        sys.argv.remove(given)
+    from figures import files_given
+
+    for given in files_given():
         return read_imu(given), Path(given).name
     folder = os.environ.get("FACTORLAB_DATA")
     real = Path(folder or "") / "imu/mpu6050/example_data_calibration.csv"

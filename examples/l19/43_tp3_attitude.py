@@ -15,7 +15,6 @@ reproduire à partir du même état.  Avec FACTORLAB_DATA, les bruits sont ceux 
 """
 
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,15 +69,6 @@ def angles(estimator, recording):
     return np.degrees(estimator.estimate(recording).roll_pitch_yaw()[:, :2])
 
 
-def own():
-    """Votre enregistrement et son nom, ou rien."""
-    given = next((name for name in sys.argv[1:] if Path(name).is_file()), None)
-    if given is None:
-        return None
-    sys.argv.remove(given)
-    return read_imu(given), Path(given).name
-
-
 def tune(quiet, rest):
     """R au repos, Q par le NIS : le filtre réglé, et de quoi dessiner le NIS en fonction de q."""
     from figures import say
@@ -101,15 +91,15 @@ def mean_nis(declare, log, q):
 
 def main():
     from claims import table
-    from figures import panels, save, say
+    from figures import files_given, panels, save, say
 
-    mine = own()
-    if mine is None:
+    mine = files_given()
+    if not mine:
         quiet, knocked, truth, origin = record(np.random.default_rng(3))
         rest = quiet.slice(0.0, 9.5)
         source = f"simulé, bruits {origin}"
     else:
-        quiet, source = mine
+        quiet, source = read_imu(mine[0]), Path(mine[0]).name
         knocked, truth = quiet, None
         rest = quiet.select(max(StillDetector().find(quiet), key=len))
     kalman, nis_of = tune(quiet, rest)

@@ -14,7 +14,6 @@ taille des cases ne change pas K.
 """
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -95,9 +94,9 @@ def told(calibration):
 
 def photos():
     """Vos images, ou celles de gauche des exemples d'OpenCV si elles sont là ; et leur nom."""
-    given = [name for name in sys.argv[1:] if Path(name).is_file()]
-    if given:
-        sys.argv[1:] = [word for word in sys.argv[1:] if word not in given]
+    from figures import files_given
+
+    if given := files_given():
         return solve(read_images(given), "vos images")[0], f"{len(given)} photos"
     folder = Path(os.environ.get("FACTORLAB_DATA") or "nowhere") / "vision/opencv"
     files = sorted(folder.glob("left[01]?.jpg"))

@@ -15,7 +15,6 @@ FACTORLAB_DATA, la boîte d'OpenCV est cherchée dans sa scène.  La commande qu
 """
 
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -128,9 +127,10 @@ def main():
 
 def photos():
     """Vos deux photos, ou la boîte d'OpenCV et sa scène ; rien s'il n'y en a pas."""
-    given = [name for name in sys.argv[1:] if Path(name).is_file()]
+    from figures import files_given
+
+    given = files_given()
     if len(given) == 2:
-        sys.argv[1:] = [word for word in sys.argv[1:] if word not in given]
         return (*given, "vos photos")
     if (DATA / "box.png").is_file():
         return DATA / "box.png", DATA / "box_in_scene.png", "photos OpenCV"

@@ -86,6 +86,21 @@ def out_folder():
     return folder
 
 
+def files_given():
+    """The student's own files: what the command line names besides options, taken out of it."""
+    found, rest, words = [], [], iter(sys.argv[1:])
+    for word in words:
+        if word.startswith("-"):
+            rest += [word, next(words)] if word in {"-o", "--out"} else [word]
+        else:
+            found.append(word)
+    for name in found:
+        if not Path(name).is_file():
+            sys.exit(f"{name} : pas de fichier de ce nom dans {Path.cwd()}")
+    sys.argv[1:] = rest
+    return found
+
+
 def script_name():
     """The name of the script that runs, without .py: figures and claims are filed under it."""
     return Path(sys.modules["__main__"].__file__).stem

@@ -136,7 +136,7 @@ def verdict_of(claim: Claim) -> str:
 
 
 def _section(outcome: Outcome, pictures: Sequence[str]) -> list[str]:
-    lines = [f"### {outcome.script.name}", ""]
+    lines = [f"### {outcome.script.name}", "", *([outcome.title, ""] if outcome.title else [])]
     if outcome.fault:
         lines += [f"**{FAILED}** : {outcome.fault}", ""]
     claims = [claim for claim in outcome.claims if not claim.is_time]

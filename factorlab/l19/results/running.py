@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
@@ -24,7 +25,7 @@ LIMIT_S = 300.0
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What one example has left: claims, tables, pictures, and what went wrong (empty where nothing did)."""
+    """What one example has left, what went wrong (empty where nothing did), and its words' first line."""
 
     script: Path
     claims: tuple[Claim, ...] = ()
@@ -32,6 +33,7 @@ class Outcome:
     pictures: tuple[Path, ...] = ()
     fault: str = ""
     seconds: float = 0.0
+    title: str = ""
 
     @property
     def item(self) -> str:
@@ -133,7 +135,16 @@ def _run(script: Path, out: Path, arguments: Sequence[str]) -> Outcome:
     except FileFormatError as error:
         fault = fault or str(error)
     pictures = tuple(sorted(out.glob(f"{script.stem}*.png")))
-    return Outcome(script, claims, tables, pictures, fault, seconds)
+    return Outcome(script, claims, tables, pictures, fault, seconds, _title(script))
+
+
+def _title(script: Path) -> str:
+    """The first line of the script's docstring, empty where there is none."""
+    try:
+        words = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
+    except (SyntaxError, ValueError):
+        return ""
+    return words.partition("\n")[0]
 
 
 def _surroundings() -> dict[str, str]:

@@ -35,6 +35,7 @@ def test_what_each_leaves(course, tmp_path):
     found = outcomes(course, tmp_path)
     assert list(found) == ["K1", "K2", "K3", "I1", "TP1"], "in the order of the course's numbers"
     assert found["K1"].good
+    assert found["K1"].title == "Un exemple."
     assert not found["K2"].good
     assert found["K2"].fault == "RMS"
     assert found["K2"].claims[0].value == 2.0, "the figure that failed is told"
