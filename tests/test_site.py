@@ -23,7 +23,7 @@ from site_reading import (
 
 from factorlab.cli import main
 
-LARGEST = 120_000  # bytes of a picture
+LARGEST = 200_000  # bytes of a picture
 SERVED = "404.html"  # shown by servers only, with addresses from their top
 PHONE = {"width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": True}
 

@@ -13,7 +13,7 @@ from mkdocs.structure.files import File, InclusionLevel
 
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"(?P<before>\]\()(?P<target>[^)\s#:]+)(?P<after>[^)\s]*(?:\s+\"[^\"]*\")?\))")
-EXAMPLE = re.compile(r"<code>(?P<path>examples/[\w/]+\.py)</code>(?!</a>)")
+EXAMPLE = re.compile(r"<code>(?P<path>(?:examples/[\w/]+|\d\d_\w+)\.py)</code>(?!</a>)")
 # files of the project that have a place of their own
 PLACES = {
     "RESULTATS.md": "l19/resultats.md",
@@ -104,7 +104,8 @@ def outside(source, text):
 
 def resolved(source, target):
     """The file of the project that a link means, or None where there is none."""
-    path = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
+    here = "" if target.startswith("/") else posixpath.dirname(source)
+    path = posixpath.normpath(posixpath.join(here, target.lstrip("/")))
     return path if not path.startswith("..") and (ROOT / path).is_file() else None
 
 
@@ -124,7 +125,10 @@ def listing(path, text):
     """A source file as a page: its docstring to read, then the code."""
     language = {".py": "python", ".c": "c", ".h": "c", ".toml": "toml"}.get(Path(path).suffix, "text")
     said, code = told(text) if language == "python" else ("", text)
-    return f"# {path}\n\n{html.escape(said, quote=False)}\n\n````{language}\n{code.strip()}\n````\n"
+    figure = f"docs/resultats/{Path(path).stem}.png"
+    shown = f"![{Path(path).stem}](/{figure})" if (ROOT / figure).is_file() else ""
+    listed = f"````{language}\n{code.strip()}\n````\n"
+    return "\n\n".join([f"# {path}", html.escape(said, quote=False), shown, listed])
 
 
 def told(text):
@@ -155,7 +159,8 @@ def on_page_content(content, page, config, files):
     """Make the name of an example a link to it."""
 
     def linked(found):
-        target = files.get_file_from_path(place(found["path"]))
+        path = found["path"] if "/" in found["path"] else f"examples/l19/{found['path']}"
+        target = files.get_file_from_path(place(path))
         return found[0] if target is None else f'<a href="{target.url_relative_to(page.file)}">{found[0]}</a>'
 
     return EXAMPLE.sub(linked, content)
