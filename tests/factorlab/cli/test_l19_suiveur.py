@@ -114,7 +114,7 @@ def test_a_signal_ends_it_properly(tmp_path, number):
         (("--seed", "-1"), "la graine doit être un entier positif ou nul"),
         (("--vite",), "--vite demande une fin"),
         (("--steps", "5", "--duree", "2"), "disent la même chose"),
-        (("--courbe", "huit"), "'huit'"),
+        (("--courbe", "huit"), "huit"),
         (("--port", "99999"), "99999"),
     ],
 )
