@@ -165,11 +165,11 @@ def draw(pictures, seen, grey, fixed, adaptive):
         counts = [f"{m} {seen[m][name][0]}/3" for m in ("BGR", "blancs, puis HSV")]
         axis.set(title=f"{name} : {', '.join(counts)}")
     axes[4].imshow(grey, cmap="gray", vmin=0, vmax=255)
-    axes[4].set(title="une page éclairée de côté")
+    axes[4].set(title="Une page éclairée de côté")
     axes[5].imshow(255 - fixed, cmap="gray")
-    axes[5].set(title="un seul niveau (Otsu)")
+    axes[5].set(title="Un seul niveau (Otsu)")
     axes[6].imshow(255 - adaptive, cmap="gray")
-    axes[6].set(title="seuil adaptatif")
+    axes[6].set(title="Seuil adaptatif")
     for axis in axes[:7]:
         axis.axis("off")
     draw_counts(axes[7], seen)

@@ -64,9 +64,9 @@ def main():
 
     figure, axes = panels(2, 2, size=(12.0, 9.0), title="TP4 (a). Calibration par damier")
     draw_corners(axes[0], *images[0], good)
-    draw_straight(axes[1], *images[0], good)
-    draw_uncertainty(axes[2], good, "vingt images : écart-type d'une projection (px)")
-    draw_uncertainty(axes[3], poor, "quatre images presque de face : écart-type (px)")
+    draw_straight(axes[1], images[0][1], good)
+    draw_uncertainty(axes[2], good, "Vingt images : écart-type d'une projection (px)")
+    draw_uncertainty(axes[3], poor, "Quatre images presque de face : écart-type (px)")
     save(figure)
 
     headings = ("paramètre", "vérité (simulée)", "trouvé ± σ", *([f"{source} ± σ"] if real else []))
@@ -113,15 +113,15 @@ def draw_corners(axes, name, image, found):
     axes.plot(*view.pixels.T, "o", color=figures.GREEN, markersize=4, markerfacecolor="none")
     look = {"angles": "xy", "scale_units": "xy", "scale": 1e-3, "width": 0.003, "color": figures.ORANGE}
     axes.quiver(*view.pixels.T, *residuals.T, **look)
-    axes.set(title="les coins, et leurs résidus × 1000", xlabel="x (px)", ylabel="y (px)")
+    axes.set(title="Les coins, et leurs résidus × 1000", xlabel="x (px)", ylabel="y (px)")
     axes.grid(visible=False)
 
 
-def draw_straight(axes, name, image, found):
+def draw_straight(axes, image, found):
     """La même image sans distorsion : les droites sont droites."""
     straight, _ = found.camera.undistort(image)
     axes.imshow(straight, cmap="gray", vmin=0, vmax=255)
-    axes.set(title=f"{name} sans distorsion", xlabel="x (px)", ylabel="y (px)")
+    axes.set(title="La même image, sans distorsion", xlabel="x (px)", ylabel="y (px)")
     axes.grid(visible=False)
 
 

@@ -38,13 +38,13 @@ def points_sigma(x, P, kappa):
     return points, np.append(kappa, np.full(2 * n, 0.5)) / (n + kappa)
 
 
-def moyenne_circulaire(angles, poids):
+def circular_mean(angles, weights):
     """Moyenne pondérée d'angles (rad), autour du premier : juste aussi pour un poids central négatif."""
     wrapped = np.angle(np.exp(1j * (angles - angles[0])))
-    return np.angle(np.exp(1j * (angles[0] + poids @ wrapped)))
+    return np.angle(np.exp(1j * (angles[0] + weights @ wrapped)))
 
 
-def corriger_ukf(x, P, observe, z, R, kappa):
+def correct_ukf(x, P, observe, z, R, kappa):
     """Correction par points sigma d'une mesure scalaire z de variance R."""
     points, weights = points_sigma(x, P, kappa)
     seen = np.array([observe(p) for p in points])
@@ -76,7 +76,7 @@ def check_sigma_points():
     points, weights = points_sigma(x, P, 1.0)
     np.testing.assert_allclose(weights @ points, x, rtol=1e-12)
     np.testing.assert_allclose((points - x).T @ np.diag(weights) @ (points - x), P, rtol=1e-12)
-    mine = corriger_ukf(x, P, lambda p: np.hypot(*(p - beacon)), 3.5, 0.1, kappa=1.0)
+    mine = correct_ukf(x, P, lambda p: np.hypot(*(p - beacon)), 3.5, 0.1, kappa=1.0)
     sensors = {"range": sq.Range([beacon], 0.1)}
     model = sq.StateSpace(sq.Vector(2), sq.Gaussian(x, P), sq.RandomWalk(0.0), sensors)
     log = sq.SensorLog({"range": sq.Stream([0.0], [3.5], context=[0.0])})
@@ -86,7 +86,7 @@ def check_sigma_points():
     # un poids central négatif : l'atan2 des sommes donnerait l'angle opposé
     angles, weights = np.radians([180.0, 150.0, -150.0, 160.0, -160.0]), np.array([-99.0] + 4 * [25.0])
     naive = np.arctan2(weights @ np.sin(angles), weights @ np.cos(angles))
-    mean = moyenne_circulaire(angles, weights)
+    mean = circular_mean(angles, weights)
     mine, theirs = np.degrees(mean), abs(np.degrees(naive))
     print(f"moyenne d'angles autour de 180° : {mine:.0f}° ; par atan2 : {theirs:.0f}°")
     assert np.isclose(abs(mean), np.pi)

@@ -202,10 +202,8 @@ def test_sigma_points_have_the_moments(d3, kappa, rng):
 
 def test_angles_are_averaged_on_the_circle(d3):
     weights = np.full(3, 1 / 3)
-    assert np.degrees(d3.moyenne_circulaire(np.radians([179.0, -179.0, -177.0]), weights)) == pytest.approx(
-        -179
-    )
-    assert d3.moyenne_circulaire(np.array([0.1, 0.2, 0.3]), weights) == pytest.approx(0.2)
+    assert np.degrees(d3.circular_mean(np.radians([179.0, -179.0, -177.0]), weights)) == pytest.approx(-179)
+    assert d3.circular_mean(np.array([0.1, 0.2, 0.3]), weights) == pytest.approx(0.2)
 
 
 @pytest.fixture(scope="module")
