@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,8 @@ OPTIONS = (
     click.option("--bruit-gyro", type=float, metavar="RAD/S", help="Bruit du gyromètre."),
     click.option("--sans-voir", type=float, metavar="S", help="Durée de conduite sans voir la ligne."),
     click.option("--detecteur", type=click.Choice(DETECTORS), help="Ce qui cherche la ligne dans l'image."),
+    click.option("--mon-detecteur", "own", type=click.Path(path_type=Path), metavar="FICHIER.py",
+                 help="Le vôtre : un fichier qui définit detecter(image)."),
     click.option("--seed", "--graine", "seed", type=int, default=0, show_default=True, help="Du hasard."),
     click.option("--steps", "--pas", "steps", type=click.IntRange(1, 100_000), metavar="N",
                  help="Finir après N pas de 50 ms.  [défaut : à Ctrl-C]"),
@@ -72,18 +75,25 @@ def suiveur(**options: Any) -> int:
 
     Le bruit de l'image, le flou de bougé, la vitesse et les gains du PID sont des curseurs : le robot roule
     pendant qu'on les déplace.  Où perd-il la ligne ?  Ctrl-C termine ; avec -o, le dernier trajet est écrit.
+
+    Avec --mon-detecteur, c'est votre fonction detecter(image) qui cherche la ligne : l'image a 40 rangées de
+    60 pixels, elle renvoie les colonnes de la ligne dans les rangées 37 et 20, ou None.  « Recommencer »
+    relit le fichier.
     """
     from contextlib import ExitStack
 
     from factorlab.cli.delivery import deliver, require_output
     from factorlab.cli.stopping import stopping
-    from factorlab.live.follower import FollowerServer, FollowerSession, csv_of, document_of
+    from factorlab.live.follower import FollowerServer, FollowerSession, OwnDetector, csv_of, document_of
 
     require_output(options["out"], None, force=options["force"])
     steps = _steps(options)
-    with _patience():
-        session = FollowerSession(_settings(options), steps=steps, wait=not options["vite"])
+    settings = _settings(options)
     with stopping() as stop, ExitStack() as ending:
+        ending.enter_context(redirect_stdout(sys.stderr))  # what a student's own detector prints
+        with _patience():
+            own = OwnDetector(options["own"]) if options["own"] is not None else None
+            session = FollowerSession(settings, steps=steps, wait=not options["vite"], own=own)
         ending.callback(session.close)
         server = FollowerServer(session, options["port"])
         ending.callback(server.close)
@@ -93,6 +103,8 @@ def suiveur(**options: Any) -> int:
             click.launch(server.address)
         while not (stop.wait(0.05) or (steps is not None and session.ended.is_set())):
             pass
+    if session.fault:
+        click.echo(f"erreur : {session.fault}", err=True)
     if not session.driven:
         click.echo("le robot n'a pas roulé : rien à écrire", err=True)
         return DATA_ERROR if session.fault else 0
@@ -106,8 +118,6 @@ def suiveur(**options: Any) -> int:
         check=options["check"],
         files=files,
     )
-    if session.fault:
-        click.echo(f"erreur : {session.fault}", err=True)
     return DATA_ERROR if session.fault else code
 
 
@@ -115,7 +125,7 @@ def suiveur(**options: Any) -> int:
 def _patience() -> Iterator[None]:
     """Say what is going on where it takes longer than a moment."""
     words = "préparation : la première fois, le calcul est compilé, ce qui prend une à deux minutes …"
-    notice = threading.Timer(2.0, click.echo, (words,), {"err": True})
+    notice = threading.Timer(6.0, click.echo, (words,), {"err": True})
     notice.start()
     try:
         yield

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from factorlab.l19.follower import PERIOD_S, Follower, FollowerSettings, Step
 from factorlab.live.follower.controls import changed
 from factorlab.live.follower.journey import Journey
+from factorlab.live.follower.own_detector import OwnDetector
+from sequential.errors import FactorlabError
 
 __all__ = ["PACES", "FollowerSession"]
 
@@ -33,10 +35,19 @@ class FollowerSession:
     settings : to begin with
     steps : of one drive; None drives on
     wait : False drives as quickly as the computer can
+    own : a detector in a file, instead of the settings' one
     """
 
-    def __init__(self, settings: FollowerSettings, *, steps: int | None = None, wait: bool = True) -> None:
-        self._robot = Follower(settings)
+    def __init__(
+        self,
+        settings: FollowerSettings,
+        *,
+        steps: int | None = None,
+        wait: bool = True,
+        own: OwnDetector | None = None,
+    ) -> None:
+        self.own = own
+        self._robot = Follower(settings, own)
         self.settings, self.steps, self.wait = settings, steps, wait
         self.pace = 1.0
         self.journeys = [Journey(1, settings)]
@@ -100,9 +111,17 @@ class FollowerSession:
                 self.journey.settings = settings
 
     def restart(self) -> None:
-        """Put the robot back on the start, with the settings as they are now."""
+        """Put the robot back on the start, with the settings as they are now.
+
+        Raises
+        ------
+        DataError
+            where the file of a detector was changed and cannot be read any more.
+        """
+        if self.own is not None:
+            self.own.read()
         with self._lock:
-            self._robot = Follower(self.settings)
+            self._robot = Follower(self.settings, self.own)
             line = np.asarray(self._robot.line)
             if not np.array_equal(line, self.line):
                 self.line, self.lines = line, self.lines + 1
@@ -140,6 +159,10 @@ class FollowerSession:
         with self._lock:
             try:
                 step = self._robot.step()
+            except FactorlabError as fault:
+                self.fault = str(fault)
+                self.ended.set()
+                return 0.0
             except Exception as fault:  # noqa: BLE001 - told on the page; the robot stands
                 self.fault = f"la simulation s'est arrêtée : {type(fault).__name__} : {fault}"
                 self.ended.set()

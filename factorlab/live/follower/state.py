@@ -50,6 +50,7 @@ def state_of(session: FollowerSession) -> dict[str, Any]:
         "pace": session.pace,
         "steps": session.steps,
         "fault": session.fault,
+        "own": session.own.name if session.own is not None else "",
         "step": None if step is None else _step(step) | {"unseen_s": journey.unseen_s},
     }
 

@@ -114,7 +114,7 @@ def test_a_signal_ends_it_properly(tmp_path, number):
         (("--seed", "-1"), "la graine doit être un entier positif ou nul"),
         (("--vite",), "--vite demande une fin"),
         (("--steps", "5", "--duree", "2"), "disent la même chose"),
-        (("--courbe", "huit"), "huit"),
+        (("--courbe", "huit"), "« huit » n'en fait pas partie : circuit, sinus"),
         (("--port", "99999"), "99999"),
     ],
 )
@@ -132,3 +132,20 @@ def test_the_options_are_the_sliders():
     assert scales == pytest.approx(SCALES)
     assert sorted(CURVES) == sorted(ALL_CURVES)
     assert tuple(DETECTORS) == ALL_DETECTORS
+
+
+def test_a_detector_of_ones_own(tmp_path):
+    path = tmp_path / "mien.py"
+    path.write_text("def detecter(image):\n    print('vu')\n    return None\n", encoding="utf-8")
+    own = (*QUIET, "--steps", 60, "--vite", "--mon-detecteur", path)
+    done = run(*own, "--json")
+    assert json.loads(done.stdout)["journey"]["lost_s"] is not None
+    assert "vu" in done.stderr
+    path.write_text("def detecter(image):\n    return image[99]\n", encoding="utf-8")
+    done = run(*own)
+    assert done.exit_code == 1
+    assert (
+        "erreur : detecter s'est arrêté (mien.py, ligne 2 « return image[99] ») : IndexError" in done.stderr
+    )
+    done = run(*QUIET, "--mon-detecteur", tmp_path / "nulle_part.py")
+    assert (done.exit_code, done.stderr.startswith("erreur : il n'y a pas de fichier")) == (1, True)

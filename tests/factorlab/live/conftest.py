@@ -47,9 +47,9 @@ def follower():
     """Begin to follow a line, each time with a page; all end with the test."""
     with contextlib.ExitStack() as begun:
 
-        def begin(*, pace=5.0, start=True, steps=None, wait=True, **settings):
+        def begin(*, pace=5.0, start=True, steps=None, wait=True, own=None, **settings):
             session = FollowerSession(
-                FollowerSettings(**{"curve": "circuit"} | settings), steps=steps, wait=wait
+                FollowerSettings(**{"curve": "circuit"} | settings), steps=steps, wait=wait, own=own
             )
             session.pace = pace
             begun.callback(session.close)

@@ -116,6 +116,10 @@ function write(id, words) {
 function showChoices({ settings, pace, paused }) {
   for (const [id, value] of [["curve", settings.curve], ["detector", settings.detector], ["pace", String(pace)], ["seed", String(settings.seed)]])
     if (document.activeElement !== at(id) && at(id).value !== value) at(id).value = value;
+  if (state.own && !at("detector").disabled) {
+    at("detector").replaceChildren(element("option", { value: settings.detector }, `le vôtre : ${state.own}`));
+    at("detector").disabled = true;
+  }
   write("pause", paused ? "Reprendre" : "Pause");
   at("pause").disabled = over || state.ended;
   at("restart").className = state.ended ? "primary" : "";
@@ -147,9 +151,10 @@ function showHeadline({ journey, step, paused, ended, fault }) {
 function advise(settings) {
   const { noise, blur_s: blur, speed_m_s: speed, kp, bridging_s: blind, detector } = settings;
   const tries = [];
-  const limit = detector === "bands" ? (blind > 0.3 ? 110 : 80) : 25; // grey levels, about
-  if (noise >= limit) tries.push("baissez le bruit de l'image");
-  if (detector !== "bands" && noise > 0) tries.push("choisissez le filtre adapté");
+  const limit = { threshold: 25, bands: blind > 0.3 ? 110 : 90, find_line: 140 }[detector]; // grey levels, about
+  if (state.own) tries.push(`regardez ce que ${state.own} répond sur cette image`);
+  else if (noise >= limit) tries.push("baissez le bruit de l'image");
+  if (!state.own && detector === "threshold" && noise > 0) tries.push("choisissez le filtre adapté");
   if (blur > 0.3) tries.push("baissez le flou");
   if (kp < 22 * speed) tries.push("montez Kp : à cette vitesse, le robot ne tourne pas assez");
   if (speed > 0.5) tries.push("ralentissez");
