@@ -21,3 +21,7 @@ def call_f(names, arguments, emit):
 def broken(names, arguments, emit):
     emit("avant")
     raise ValueError("le vérificateur lui-même")
+
+
+def broken_check(names, arguments, emit):
+    raise KeyError("une faute du vérificateur")

@@ -127,6 +127,8 @@ def _findings(found: Survey, run: StudentRun, exercise: str) -> tuple[Finding, .
     if run.fault is not None:
         said = f"La vérification s'est arrêtée là : {run.fault.said}."
         fault = run.fault
+        if fault.line is None and fault.kind not in {"durée", "mort"}:
+            said = f"Le vérificateur s'est trompé, et non vous ({fault.kind}) : signalez-le avec ce fichier."
         rows.append(Finding(exercise, "fin", FAIL, END, said, line=fault.line, code=fault.code))
     if not rows:
         rows.append(

@@ -66,7 +66,7 @@ def _check_median(sheet: Sheet, function: Callable[..., Any]) -> None:
             return
         rows.append(got)
     if _judge(sheet, inputs, rows):
-        _ends(sheet, *inputs[1], np.asarray(rows[1], float).ravel())
+        _ends(sheet, inputs[1:], [np.asarray(row, float).ravel() for row in rows[1:]])
         _even(sheet, function)
         _plain_list(sheet, function)
         _time(sheet, function)
@@ -109,10 +109,10 @@ def _agrees(got: Array, wanted: Array, k: int) -> bool:
     return bool(np.allclose(got[inner], wanted[inner], rtol=1e-9, atol=1e-12))
 
 
-def _ends(sheet: Sheet, x: Array, k: int, got: Array) -> None:
+def _ends(sheet: Sheet, inputs: list[tuple[Array, int]], rows: list[Array]) -> None:
     """What is done at the ends, where the statement leaves the choice."""
     for how, of in EDGES.items():
-        if np.allclose(got, of(x, k), equal_nan=True):
+        if all(np.allclose(f, of(x, k), equal_nan=True) for f, (x, k) in zip(rows, inputs, strict=True)):
             if how:
                 kept = "Une fenêtre raccourcie garde toutes les mesures sans en inventer."
                 sheet.remark("bords", "aux bords", f"Vous avez choisi {how} : accepté. {kept}")
@@ -158,5 +158,5 @@ def _time(sheet: Sheet, function: Callable[..., Any]) -> None:
         sheet.remark("durée", title, f"Plus de {LONG_S:g} s pour {LONG} mesures et k = {LONG_K} : l'énoncé "
                      "demande O(n·k), une fenêtre triée ou np.median par mesure.")  # fmt: skip
         return
-    each_us = 1e6 * (time.perf_counter() - began) / LONG
-    sheet.passed("durée", title, f"Environ {each_us:.0f} µs par mesure pour k = {LONG_K}.")
+    each_us = f"{1e6 * (time.perf_counter() - began) / LONG:.2g}".replace(".", ",")
+    sheet.passed("durée", title, f"{each_us} µs par mesure pour k = {LONG_K}.")

@@ -138,7 +138,7 @@ def _other_start(sheet: Sheet, function: Any) -> None:
     d = np.linspace(0.08, 0.8, 40)
     triple = parameters_of(sheet.call.tried(function, d.copy(), volts(d, 0.28, 0.005, 0.1)))
     if triple is None or not np.allclose(volts(d, *triple), volts(d, 0.28, 0.005, 0.1), atol=0.02):
-        said = "L'ajustement n'aboutit pas quand d est en mètres : son départ est réglé pour des centimètres."
+        said = "L'ajustement n'aboutit pas quand d est en mètres : permis, son départ est réglé pour des cm."
         sheet.remark("ajuster.départ", "ajuster : un autre capteur, en mètres", said)
 
 

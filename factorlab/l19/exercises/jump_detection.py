@@ -15,6 +15,7 @@ from factorlab.l19.exercises.window_mutants import (
     WRONG_RULES,
     Array,
     global_levels,
+    levels_of,
     noisy_jumps,
     separated,
 )
@@ -49,6 +50,8 @@ def check_jumps(sheet: Sheet, function: Callable[..., Any]) -> None:
         sheet.stumbled("detecter_sauts", TITLE, stumble.fault, **more)
         return
     more["got"] = shown(small)
+    if (same := _indices(small, np.array(SMALL))[0]) is not None and same.tolist() == SMALL_FOUND:
+        more = {}  # the small example does not show the mistake
     if not np.array_equal(given, x):
         copy = Cause("argument modifié", "travaillez sur une copie : x = np.array(x, float).")
         sheet.wrong("detecter_sauts", TITLE, "`detecter_sauts` change le tableau x qu'on lui donne.", copy)
@@ -107,6 +110,9 @@ def _accepted(x: Array, found: set[int]) -> str | None:
     for how, rule in RULES.items():
         if found and found == _inner(np.flatnonzero(rule(x, K, THRESHOLD))):
             return how
+    for how, level in global_levels(x, K, THRESHOLD).items():
+        if found and found == _inner(np.flatnonzero(levels_of(x, K) > level)):
+            return f"{GLOBAL}{how}"
     return None
 
 

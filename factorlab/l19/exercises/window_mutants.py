@@ -22,6 +22,7 @@ __all__ = [
     "WRONG_RULES",
     "Array",
     "global_levels",
+    "levels_of",
     "noisy_jumps",
     "separated",
     "sliding",
@@ -117,6 +118,11 @@ RULES: dict[str, Callable[[Array, int, float], NDArray[np.bool_]]] = {
         np.abs(_residual(x, k)) > s * sliding(np.abs(_residual(x, k)), k // 2, k // 2)
     ),
 }
+
+
+def levels_of(x: Array, k: int) -> Array:
+    """|x - local median|, (N,)."""
+    return np.abs(_residual(x, k))
 
 
 def global_levels(x: Array, k: int, s: float) -> dict[str, float]:

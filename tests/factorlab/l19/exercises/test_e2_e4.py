@@ -26,6 +26,7 @@ def test_a_wrong_solution_is_called_by_name(changed, solution, cause, changes):
     ("solution", "word"),
     [
         (E2_NAIVE, "avec une MAD globale"),
+        (E2_NAIVE.replace("np.median(ecart)", "np.median(np.abs(x - np.median(x)))"), "celle de x entier"),
         (E2_NAIVE, "np.where rend un tuple"),
         (E2_NAIVE, "première et la dernière mesure répétées"),
         (E2.replace("1.4826 * ", ""), "sans le facteur 1,4826"),
@@ -81,3 +82,13 @@ def test_one_file_may_answer_several_exercises(tmp_path):
         ("E3", "PASS"),
         ("E4", "PASS"),
     ]
+
+
+def test_a_mistake_of_the_checker_is_not_the_student_s(tmp_path, monkeypatch):
+    from factorlab.l19.exercises import checking
+
+    path = tmp_path / "copie.py"
+    path.write_text(E2, encoding="utf-8")
+    monkeypatch.setattr(checking, "JOB", "student_jobs:broken_check")
+    (verdict,) = checking.check_path(path)
+    assert "Le vérificateur s'est trompé" in verdict.exercises[0].findings[-1].said
