@@ -104,7 +104,7 @@ def jacobian():
     return f"jacobienne et différences finies : {apart:.0e} d'écart"
 
 
-def wrap():
+def wrapping():
     def replier(a):
         return np.pi - (np.pi - a) % (2 * np.pi)
 
@@ -220,7 +220,7 @@ CHECKS = {
     "Filtre de Kalman": kalman,
     "Bruit d'un modèle à vitesse constante": constant_velocity,
     "EKF": jacobian,
-    "Repli d'un angle": wrap,
+    "Repli d'un angle": wrapping,
     "Points sigma": sigma_points,
     "Portillon": gate,
     "Inclinaison": tilt,
