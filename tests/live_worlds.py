@@ -1,5 +1,7 @@
-"""Videos that the tests of live pages render, and a camera that is unplugged."""
+"""Videos that the tests of live pages render, a camera that is unplugged, and requests to a page."""
 
+import contextlib
+import http.client
 import time
 
 import cv2
@@ -70,3 +72,17 @@ class Unplugged:
 
     def release(self):
         self.open = False
+
+
+@contextlib.contextmanager
+def asked(server, path, *, method="GET", body=None, **headers):
+    """An answer whose body is not read yet."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+    connection.request(method, path, body=body, headers=headers)
+    with contextlib.closing(connection), connection.getresponse() as answer:
+        yield answer
+
+
+def ask(server, path, **options):
+    with asked(server, path, **options) as answer:
+        return answer, answer.read()

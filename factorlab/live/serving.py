@@ -25,7 +25,7 @@ __all__ = ["ENGLISH", "FRENCH", "LocalServer", "PageHandler", "PageWords", "as_b
 HOST = "127.0.0.1"
 EVENT_S = 0.05
 KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
-SHARED = ("look.css", "elements.js", "theme.js")
+SHARED = ("look.css", "elements.js", "orders.js", "theme.js")
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'"
 )

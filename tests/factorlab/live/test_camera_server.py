@@ -1,7 +1,5 @@
 """The server: whole pictures with their times, events, files, and nothing for strangers."""
 
-import contextlib
-import http.client
 import json
 import socket
 import threading
@@ -10,7 +8,7 @@ import time
 import cv2
 import numpy as np
 import pytest
-from live_worlds import wait_for, write_video
+from live_worlds import ask, asked, wait_for, write_video
 
 from factorlab.live.camera import PageServer, Task, TaskChoice
 from factorlab.live.camera.reading import Dots, Label, Line, Reading
@@ -42,20 +40,6 @@ def served(live, marker_video):
     session.start()
     wait_for(lambda: session.shown.number > 0)
     return session, server
-
-
-@contextlib.contextmanager
-def asked(server, path, *, method="GET", body=None, **headers):
-    """An answer whose body is not read yet."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
-    connection.request(method, path, body=body, headers=headers)
-    with contextlib.closing(connection), connection.getresponse() as answer:
-        yield answer
-
-
-def ask(server, path, **options):
-    with asked(server, path, **options) as answer:
-        return answer, answer.read()
 
 
 def tell(server, wish, **headers):
@@ -138,7 +122,17 @@ def test_files_of_the_task_are_offered_and_no_others(served):
 
 @pytest.mark.parametrize(
     "path",
-    ["/", "/look.css", "/page.css", "/page.js", "/elements.js", "/panels.js", "/charts.js", "/theme.js"],
+    [
+        "/",
+        "/look.css",
+        "/page.css",
+        "/page.js",
+        "/elements.js",
+        "/orders.js",
+        "/panels.js",
+        "/charts.js",
+        "/theme.js",
+    ],
 )
 def test_the_page_needs_nothing_from_elsewhere(served, path):
     _, server = served

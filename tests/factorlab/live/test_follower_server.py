@@ -1,30 +1,14 @@
 """The follower's server: its files, its events, its commands, and sentences in French."""
 
-import contextlib
 import csv
-import http.client
 import io
 import json
 
 import pytest
-from live_worlds import wait_for
+from live_worlds import ask, asked, wait_for
 
 from factorlab.live.follower import FollowerServer
 from sequential.errors import DataError
-
-
-@contextlib.contextmanager
-def asked(server, path, *, method="GET", body=None, **headers):
-    """An answer whose body is not read yet."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
-    connection.request(method, path, body=body, headers=headers)
-    with contextlib.closing(connection), connection.getresponse() as answer:
-        yield answer
-
-
-def ask(server, path, **options):
-    with asked(server, path, **options) as answer:
-        return answer, answer.read()
 
 
 def tell(server, wish, **headers):
@@ -33,7 +17,7 @@ def tell(server, wish, **headers):
 
 
 OWN = ("", "page.css", "page.js", "controls.js", "map.js", "strips.js")
-SHARED = ("look.css", "elements.js", "theme.js")
+SHARED = ("look.css", "elements.js", "orders.js", "theme.js")
 
 
 @pytest.mark.parametrize("name", [*OWN, *SHARED])

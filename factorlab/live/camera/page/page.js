@@ -3,6 +3,7 @@
 import { element, fill } from "/elements.js";
 import { drawPanel, quantity, table } from "/panels.js";
 import { Traces } from "/charts.js";
+import { order } from "/orders.js";
 import { watchTheme } from "/theme.js";
 
 const at = (id) => document.getElementById(id);
@@ -13,12 +14,7 @@ let over = false;
 
 async function send(wish) {
   try {
-    const answer = await fetch("/command", {
-      method: "POST",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify(wish),
-    });
-    const told = await answer.json();
+    const told = await order(wish);
     show(told.state);
     if (told.fault) {
       at("message").textContent = told.fault;

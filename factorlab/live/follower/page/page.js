@@ -4,6 +4,7 @@ import { element, fill } from "/elements.js";
 import { bound, Controls, french } from "/controls.js";
 import { GroundMap } from "/map.js";
 import { Strip } from "/strips.js";
+import { order } from "/orders.js";
 import { watchTheme } from "/theme.js";
 
 const MOST = 8000; // steps of the way that are drawn
@@ -29,12 +30,7 @@ let over = false;
 async function send(wish) {
   if (over) return;
   try {
-    const answer = await fetch("/command", {
-      method: "POST",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify(wish),
-    });
-    const told = await answer.json();
+    const told = await order(wish);
     say(told.fault);
     show(told.state);
   } catch {
