@@ -2,6 +2,8 @@
 
 import ast
 import fcntl
+import importlib
+import inspect
 import os
 import re
 import subprocess
@@ -68,6 +70,21 @@ def test_every_package_and_command_has_its_page(site):
     left_out = {name for name in packages - shown if not re.search(r"\.(cli|kernels)\b", name)}
     assert not left_out
     assert set(main.commands) <= {path.stem for path in (site / "commands").glob("*.html")}
+
+
+def test_every_public_name_is_in_the_reference(pages):
+    anchors = {anchor for page in pages.values() if page.path.parent.name == "api" for anchor in page.anchors}
+    shown = {anchor.rsplit(".", 1)[-1] for anchor in anchors}
+    rooms = [path.stem for path in (page.path for page in pages.values()) if path.parent.name == "api"]
+    left_out = set()
+    for room in set(rooms) - {"index"}:
+        module = importlib.import_module(room)
+        things = {name: getattr(module, name) for name in getattr(module, "__all__", ())}
+        public = {
+            name for name, thing in things.items() if inspect.isclass(thing) or inspect.isroutine(thing)
+        }
+        left_out |= {f"{room}.{name}" for name in public - shown}
+    assert not left_out
 
 
 def test_nothing_is_loaded_from_elsewhere(site, pages):
