@@ -110,7 +110,7 @@ def check_file(found: Survey, *, limit_s: float = 120.0) -> FileVerdict:
         return FileVerdict(found.path, (), syntax=found.fault)
     arguments = {
         "path": str(found.path.resolve()),
-        "exercises": {exercise: found.offered(exercise) for exercise in found.exercises},
+        "exercises": {exercise: list(names) for exercise, names in found.offers.items()},
     }
     run = run_student(found.path, JOB, arguments, limit_s=limit_s)
     exercises = tuple(ExerciseVerdict(e, _findings(found, run, e)) for e in found.exercises)

@@ -29,7 +29,7 @@ def judge(names: Mapping[str, Any], arguments: Mapping[str, Any], emit: Callable
     compiled = {"numba", "sequential", "vision3d"} & set(sys.modules)  # compiles at its first call
     call = Caller(Path(arguments["path"]), limit_s=COMPILED_S if compiled else PLAIN_S)
     for exercise, wanted in arguments["exercises"].items():
-        sheet = Sheet(exercise, names, call, emit)
+        sheet = Sheet(exercise, {name: names[name] for name in wanted if name in names}, call, emit)
         lost = [name for name in wanted if name not in names]
         for name in lost:
             said = f"`{name}` n'est pas encore défini là où le fichier s'arrête : corrigez cette ligne."

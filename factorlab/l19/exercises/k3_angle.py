@@ -87,10 +87,6 @@ def _check_fold(sheet: Sheet, name: str, function: Callable[..., Any]) -> None:
 
 def _check_innovation(sheet: Sheet, name: str, function: Callable[..., Any]) -> None:
     title = f"{name} : {TITLE}"
-    if signature_fault(function, ("z", "prevu")):
-        said = f"`{name}` n'a pas deux arguments (z, prevu) : elle n'est pas jugée."
-        sheet.remark(name, title, said)
-        return
     z, foreseen = np.radians([-179.0, 179.0, 10.0]), np.radians([179.0, -179.0, 30.0])
     wanted = _folded(z - foreseen)
     try:

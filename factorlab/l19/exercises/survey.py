@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from factorlab.l19.exercises.fault import Fault
@@ -17,29 +18,34 @@ EXERCISES: dict[str, tuple[str, ...]] = {
     "E3": ("ajuster", "distance", "incertitude_distance"),
     "E4": ("composantes", "plus_gros_objet"),
 }
-# judged where a file offers one of these names; none of them is asked for
-OPTIONAL: dict[str, tuple[str, ...]] = {
-    "K3": (
-        *("replier", "replier_angle", "normaliser_angle", "wrap", "wrap_angle", "wrap_to_pi"),
-        *("innovation", "innovation_angle", "difference_angle", "ecart_angle"),
-        *("KalmanAngle", "EKF", "KalmanEtendu"),
-    ),
-    "D3": ("points_sigma",),
+# judged where a file defines one of these with so many arguments; none of them is asked for
+OPTIONAL: dict[str, dict[str, int]] = {
+    "K3": {
+        **dict.fromkeys(
+            ("replier", "replier_angle", "normaliser_angle", "wrap", "wrap_angle", "wrap_to_pi"), 1
+        ),
+        **dict.fromkeys(("innovation", "innovation_angle", "difference_angle", "ecart_angle"), 2),
+        **dict.fromkeys(("KalmanAngle", "EKF", "KalmanEtendu"), 7),
+    },
+    "D3": {"points_sigma": 3},
 }
+# names that many programs have say nothing by themselves
+COMMON = {"distance"}
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What a file holds: its names, the exercises they belong to, or the line where it is no Python."""
+    """What a file holds: its names, those of each exercise, or the line where it is no Python."""
 
     path: Path
     names: tuple[str, ...] = ()
-    exercises: tuple[str, ...] = ()
+    offers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     fault: Fault | None = None
 
-    def offered(self, exercise: str) -> list[str]:
-        """Names of an exercise that the file defines."""
-        return [name for name in {**EXERCISES, **OPTIONAL}[exercise] if name in self.names]
+    @property
+    def exercises(self) -> tuple[str, ...]:
+        """The exercises that the file answers."""
+        return tuple(self.offers)
 
     def missing(self, exercise: str) -> dict[str, str]:
         """Names of an exercise that the file lacks, each with what may have been meant."""
@@ -70,9 +76,37 @@ def survey(path: Path, *, imported: bool = True) -> Survey:
         return Survey(path, fault=Fault("syntaxe", said, error.lineno, code))
     except ValueError as error:  # a null byte
         return Survey(path, fault=Fault("syntaxe", f"ce n'est pas un fichier Python ({error})"))
-    names = tuple(dict.fromkeys(name for node in tree.body for name in _defined(node, imported=imported)))
-    found = tuple(e for e, wanted in {**EXERCISES, **OPTIONAL}.items() if set(wanted) & set(names))
-    return Survey(path, names, found)
+    own = _names(tree, imported=False)
+    names = _names(tree, imported=True) if imported else own
+    offers = {
+        exercise: tuple(name for name in wanted if name in names)
+        for exercise, wanted in EXERCISES.items()
+        if (set(wanted) - COMMON) & set(own)
+    }
+    for exercise, counts in OPTIONAL.items():
+        if found := tuple(name for node in tree.body if (name := _fitting(node, counts))):
+            offers[exercise] = found
+    return Survey(path, names, offers)
+
+
+def _names(tree: ast.Module, *, imported: bool) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for node in tree.body for name in _defined(node, imported=imported)))
+
+
+def _fitting(node: ast.stmt, counts: Mapping[str, int]) -> str:
+    """The name of a definition that can be called with its number of arguments, or nothing."""
+    function: ast.stmt | None = node
+    if isinstance(node, ast.ClassDef):
+        function = next((f for f in node.body if getattr(f, "name", "") == "__init__"), None)
+    if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name not in counts:
+        return ""
+    if not isinstance(function, ast.FunctionDef):
+        return ""
+    given = function.args
+    most = len(given.posonlyargs) + len(given.args) - isinstance(node, ast.ClassDef)
+    least = most - len(given.defaults)
+    fits = least <= counts[node.name] and (given.vararg is not None or counts[node.name] <= most)
+    return node.name if fits else ""
 
 
 def _defined(node: ast.stmt, *, imported: bool) -> list[str]:
