@@ -34,7 +34,7 @@ def place(name):
 
 def page(command, name, level=1):
     """The help of a command, then that of its subcommands."""
-    context = click.Context(
+    context = command.context_class(
         command, info_name=f"factorlab {name}", max_content_width=WIDTH, terminal_width=WIDTH
     )
     lines = [f"{'#' * level} factorlab {name}", "", "```text", command.get_help(context), "```", ""]
