@@ -96,14 +96,16 @@ def _head(work: Work) -> list[str]:
 def _overview(work: Work) -> Iterable[str]:
     yield "## Le cours, point par point"
     yield ""
-    yield from table_lines(("", "fichier", *CLAIM_HEADINGS))
+    # the verdict beside the id, where a narrow window does not cut it off
+    yield from table_lines(("", CLAIM_HEADINGS[-1], "fichier", *CLAIM_HEADINGS[:-1]))
     missing = set(work.missing)
     for item in COURSE:
         for one in work.outcomes:
             if one.item == item.id:
-                yield _row((f"**{item.id}**", _file(one.script.name, work.sources), *_headline(one)))
+                *found, verdict = _headline(one)
+                yield _row((f"**{item.id}**", verdict, _file(one.script.name, work.sources), *found))
         if item.id in missing:
-            yield _row((f"**{item.id}**", "–", item.title, "–", "–", "–", MISSING))
+            yield _row((f"**{item.id}**", MISSING, "–", item.title, "–", "–", "–"))
 
 
 def _file(name: str, sources: Mapping[str, str]) -> str:
