@@ -62,9 +62,6 @@ def check(sheet: Sheet) -> None:
 
 def _check_fold(sheet: Sheet, name: str, function: Callable[..., Any]) -> None:
     title = f"{name} : {TITLE}"
-    if signature_fault(function, ("angle",)):
-        sheet.remark(name, title, f"`{name}` ne prend pas un angle seul : elle n'est pas jugée.")
-        return
     try:
         got = np.array([float(np.squeeze(sheet.call(function, float(a)))) for a in ANGLES])
     except Stumble as stumble:

@@ -36,8 +36,6 @@ def test_a_wrong_solution_is_called_by_name(changed, solution, cause, changes):
         (E4_ROWS, "(ligne, colonne)"),
         (E4_ROWS, "accepté ; « au moins aire_min » s'écrit >="),
         (E4_FLAT, "arrondis"),
-        ("def wrap():\n    return 1\n", "ne prend pas un angle seul"),
-        ("def innovation(axis):\n    return axis\n", "n'a pas deux arguments"),
         (E4.replace("deque([(i, j)])", "[(i, j)]").replace("file.popleft()", "file.pop(0)"), None),
     ],
 )  # fmt: skip
