@@ -179,6 +179,17 @@ def test_python_shown_is_python(note):
         ast.parse(code)
 
 
+def test_the_tour_tells_what_the_comparison_finds():
+    from factorlab.compare import compare
+    from factorlab.datasets import load
+
+    (kitti,) = load("kitti", use_every=5)
+    tour = (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
+    ekf, smoother = compare(kitti, ("ekf", "ekf_rts"), lags=()).rows
+    assert f"EKF {ekf.rmse:.2f} m, EKF + RTS {smoother.rmse:.2f} m" in tour
+    assert f"mean NIS of gps  {ekf.nis.mean:.1f}" in tour
+
+
 @pytest.fixture
 def window(browser, tmp_path):
     """A browser window."""
