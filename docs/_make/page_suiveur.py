@@ -17,7 +17,7 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 TARGET = ROOT / "docs" / "pictures" / "suiveur.png"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-WIDTH, HEIGHT, COLOURS = 1280, 1150, 160
+WIDTH, HEIGHT, COLOURS = 1280, 1185, 160
 FIRST = FollowerSettings(curve="circuit", noise=45.0, kp=6.0)
 
 
