@@ -98,6 +98,8 @@ def _fitting(node: ast.stmt, counts: Mapping[str, int]) -> str:
     function: ast.stmt | None = node
     if isinstance(node, ast.ClassDef):
         function = next((f for f in node.body if getattr(f, "name", "") == "__init__"), None)
+        if function is None and node.bases and node.name in counts:
+            return node.name  # the arguments of the class that it extends
     if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name not in counts:
         return ""
     if not isinstance(function, ast.FunctionDef):

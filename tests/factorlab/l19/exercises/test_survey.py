@@ -31,6 +31,7 @@ def of(tmp_path):
         ("from textwrap import wrap", ()),
         ("class EKF:\n    def __init__(self, x0, P0): pass", ()),
         ("class EKF:\n    def __init__(self, F, B, H, Q, R, x0, P0): pass", ("K3",)),
+        ("class KalmanAngle(Kalman):\n    def corriger(self, z): pass", ("K3",)),
         ("def points_sigma(x, P, kappa=1): pass", ("D3",)),
         ("class EKF: pass\nx = 1", ()),
     ],
