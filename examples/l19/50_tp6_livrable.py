@@ -78,8 +78,8 @@ PARTS = {  # ce que l'énoncé demande, et le fichier qui le montre
 def raw_data(folder, rng):
     """Les données brutes : trois enregistrements de l'IMU, et les images."""
     (folder / "damier").mkdir(parents=True)
-    still = tumble(100.0, rng, rest=90.0)
-    shaken = tumble(40.0, rng, angle=0.1, sway=0.01, period=(2.0, 8.0), rest=10.0)
+    still = tumble(70.0, rng, rest=60.0)
+    shaken = tumble(30.0, rng, angle=0.1, sway=0.01, period=(2.0, 8.0), rest=10.0)
     motions = {"repos": still, "positions": waypoints(SIX_POSITIONS, 3.0, 1.0), "secousses": shaken}
     for name, motion in motions.items():
         write_imu(simulate_imu(motion, rng, errors=ERRORS, field=None).recording, folder / f"{name}.csv")
