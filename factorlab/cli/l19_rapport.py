@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["rapport"]
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+UNSEEN = {"force", "as_json", "compare", "jobs"}  # options that change nothing in the page
 OWN = {  # option -> the example that reads it, and how it is told so
     "imu": ("TP1", "41_tp1_"),
     "positions": ("TP2", "42_tp2_"),
@@ -112,19 +113,18 @@ def _work(options: Mapping[str, Any], folder: Path) -> Work:
 
 
 def _command(options: Mapping[str, Any]) -> str:
-    """The command with the options that were given, as it can be typed again."""
+    """The command with the options that shape the page, as it can be typed again."""
     import shlex
 
     words = ["factorlab", "l19", "rapport"]
     for parameter in rapport.params:
         name = parameter.name or ""
         value = options.get(name)
-        if value in (None, "", False) or value == parameter.default:
+        if value in (None, "", False) or value == parameter.default or name in UNSEEN:
             continue
         words.append("-o" if name == "out" else f"--{name}")
-        if value is not True:
-            words += [str(one) for one in (value if isinstance(value, tuple) else (value,))]
-    return shlex.join(word for word in words if word not in {"--force", "--as_json"})
+        words += [str(one) for one in (value if isinstance(value, tuple) else (value,))]
+    return shlex.join(words)
 
 
 def _own(

@@ -29,7 +29,8 @@ def test_a_report_of_two_items(course, tmp_path):
     text = (tmp_path / "rendu" / "RESULTATS.md").read_text(encoding="utf-8")
     assert text.startswith("# Résultats du module L19, « Perception » : Ada\n")
     assert "| NIS moyen | 1 | 0,9 à 1,1 | simulé | bon |" in text
-    assert f"-o {tmp_path / 'rendu'}" in text
+    typed = f"factorlab l19 rapport -o {tmp_path / 'rendu'} --cours {course} --only K1,TP1 --nom Ada"
+    assert f"Page écrite par `{typed}`" in text
     assert "[ 2/2]" in done.stderr
     assert "2 grandeurs sur 2" in done.stdout
 
