@@ -93,6 +93,12 @@ def _head(work: Work) -> list[str]:
     return lines
 
 
+def _named(files: Sequence[str]) -> str:
+    if len(files) <= 3:
+        return ", ".join(f"`{file}`" for file in files)
+    return f"{len(files)} fichiers, de `{files[0]}` à `{files[-1]}`"
+
+
 def _overview(work: Work) -> Iterable[str]:
     yield "## Le cours, point par point"
     yield ""
@@ -102,7 +108,7 @@ def _overview(work: Work) -> Iterable[str]:
     for item in COURSE:
         for one in work.outcomes:
             if one.item == item.id:
-                *found, verdict = _headline(one)
+                *found, verdict = _headline(one, own=one.item in work.recordings)
                 yield _row((f"**{item.id}**", verdict, _file(one.script.name, work.sources), *found))
         if item.id in missing:
             yield _row((f"**{item.id}**", MISSING, "–", item.title, "–", "–", "–"))
@@ -112,8 +118,10 @@ def _file(name: str, sources: Mapping[str, str]) -> str:
     return f"[`{name}`]({sources[name]})" if name in sources else f"`{name}`"
 
 
-def _headline(outcome: Outcome) -> tuple[str, ...]:
-    claim = outcome.headline
+def _headline(outcome: Outcome, *, own: bool) -> tuple[str, ...]:
+    # where a student has measured, what was measured leads
+    measured = [claim for claim in outcome.claims if own and not claim.source.startswith("simulé")]
+    claim = measured[0] if measured else outcome.headline
     if claim is None:
         words = outcome.fault or "aucune grandeur annoncée"
         return (words, "–", "–", "–", FAILED if outcome.fault else SILENT)

@@ -63,6 +63,15 @@ def test_tables_and_pictures_of_the_practical_work(tmp_path):
     assert "![Figure de 46_tp4b_marqueurs](figures/a.png)" in text
 
 
+def test_what_a_student_measured_leads(tmp_path):
+    mine = Claim("K1", "résidu", 0.3, "px", source="12 photos")
+    one = replace(K1, claims=(CLAIMS[1], mine))
+    files = [f"damier/{k}.jpg" for k in range(12)]
+    text = page(tmp_path, one, recordings={"K1": files}).read_text(encoding="utf-8")
+    assert "| **K1** | dit | `05_k1_kalman_1d.py` | résidu | 0,3 px | – | 12 photos |" in text
+    assert "- K1 : 12 fichiers, de `damier/0.jpg` à `damier/11.jpg`" in text
+
+
 def test_a_failing_example_is_a_line_that_says_so(tmp_path):
     broken = Outcome(Path("06_k2_regler.py"), CLAIMS[:1], fault="R : 3, au plus 2 attendu")
     text = page(tmp_path, K1, broken).read_text(encoding="utf-8")
