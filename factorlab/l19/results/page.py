@@ -77,9 +77,7 @@ def _head(work: Work) -> list[str]:
     lines = [f"# Résultats du module L19, « Perception »{f' : {work.name}' if work.name else ''}", ""]
     if work.recordings:
         lines.append("Enregistrements personnels :\n")
-        lines += [
-            f"- {item} : {', '.join(f'`{f}`' for f in files)}" for item, files in work.recordings.items()
-        ]
+        lines += [f"- {item} : {_named(files)}" for item, files in work.recordings.items()]
         lines.append("")
     scripts = "exemple a tourné" if len(work.outcomes) == 1 else "exemples ont tourné"
     lines.append(
