@@ -16,7 +16,7 @@ PACKAGES := chromium gcc g++ make \
 	cppcheck clang /usr/lib/llvm-*/lib/clang/*/include/fuzzer:libclang-rt-dev
 # what looks at images
 VISION_TESTS := tests/vision3d tests/test_image_conventions.py \
-	$(patsubst %,tests/factorlab/%,camera cam_imu marker_map markers live match stereo) tests/factorlab/cli/test_sheet.py \
+	$(patsubst %,tests/factorlab/%,camera cam_imu l19/follower marker_map markers live match stereo) tests/factorlab/cli/test_sheet.py \
 	$(patsubst %,tests/factorlab/cli/test_%_command.py,camera line live marker_map objects sfm undistort)
 # Two workers on two cores: linear algebra libraries must not start threads of their own.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1

@@ -1,5 +1,7 @@
 """E2, E3, E4 and K3: right solutions of several tastes pass, wrong ones are called by name."""
 
+from pathlib import Path
+
 import pytest
 from exercise_copies import E2, E2_NAIVE, E3, E4, E4_FLAT, E4_ROWS, RECURSIVE, RIGHT
 from exercise_mistakes import WRONG
@@ -89,6 +91,7 @@ def test_a_mistake_of_the_checker_is_not_the_student_s(tmp_path, monkeypatch):
 
     path = tmp_path / "copie.py"
     path.write_text(E2, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[3]))  # where student_jobs lies
     monkeypatch.setattr(checking, "JOB", "student_jobs:broken_check")
     (verdict,) = checking.check_path(path)
     assert "Le vérificateur s'est trompé" in verdict.exercises[0].findings[-1].said
