@@ -131,7 +131,5 @@ def _findings(found: Survey, run: StudentRun, exercise: str) -> tuple[Finding, .
             said = f"Le vérificateur s'est trompé, et non vous ({fault.kind}) : signalez-le avec ce fichier."
         rows.append(Finding(exercise, "fin", FAIL, END, said, line=fault.line, code=fault.code))
     if not rows:
-        rows.append(
-            Finding(exercise, "fin", FAIL, "aller jusqu'au bout", "Aucune vérification n'a pu se faire.")
-        )
+        rows.append(Finding(exercise, "fin", FAIL, END, "Aucune vérification n'a pu se faire."))
     return tuple(rows)

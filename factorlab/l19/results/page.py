@@ -107,9 +107,9 @@ def _overview(work: Work) -> Iterable[str]:
         for one in work.outcomes:
             if one.item == item.id:
                 *found, verdict = _headline(one, own=one.item in work.recordings)
-                yield _row((f"**{item.id}**", verdict, _file(one.script.name, work.sources), *found))
+                yield row_line((f"**{item.id}**", verdict, _file(one.script.name, work.sources), *found))
         if item.id in missing:
-            yield _row((f"**{item.id}**", MISSING, "–", item.title, "–", "–", "–"))
+            yield row_line((f"**{item.id}**", MISSING, "–", item.title, "–", "–", "–"))
 
 
 def _file(name: str, sources: Mapping[str, str]) -> str:
@@ -149,7 +149,7 @@ def _section(outcome: Outcome, pictures: Sequence[str]) -> list[str]:
         lines += [f"**{FAILED}** : {outcome.fault}", ""]
     claims = [claim for claim in outcome.claims if not claim.is_time]
     if claims:
-        lines += [*table_lines(CLAIM_HEADINGS), *(_row(cells(claim)) for claim in claims), ""]
+        lines += [*table_lines(CLAIM_HEADINGS), *(row_line(cells(claim)) for claim in claims), ""]
     for table in outcome.tables:
         lines += [f"{table.caption} :", "", *_table(table), ""]
     return lines + [line for path in pictures for line in (f"![Figure de {outcome.script.stem}]({path})", "")]
@@ -160,7 +160,9 @@ def _table(table: Table) -> Iterable[str]:
     right = [all(_is_number(row[k]) for row in table.rows) for k in range(len(names))]
     yield from table_lines(names, right)
     for row in table.rows:
-        yield _row([c if isinstance(c, str) else number(None) if c is None else number_text(c) for c in row])
+        yield row_line(
+            [c if isinstance(c, str) else number(None) if c is None else number_text(c) for c in row]
+        )
 
 
 def _is_number(cell: str | float | None) -> bool:
@@ -178,14 +180,15 @@ def _times(outcomes: Sequence[Outcome]) -> Iterable[str]:
     yield ""
     yield from table_lines(("fichier", "grandeur", "valeur"))
     for name, claim in rows:
-        yield _row((f"`{name}`", *cells(claim)[:2]))
+        yield row_line((f"`{name}`", *cells(claim)[:2]))
 
 
 def table_lines(headings: Sequence[str], right: Sequence[bool] = ()) -> list[str]:
     """The two first lines of a table."""
     sides = ["--:" if k < len(right) and right[k] else "---" for k in range(len(headings))]
-    return [_row(headings), "|" + "|".join(sides) + "|"]
+    return [row_line(headings), "|" + "|".join(sides) + "|"]
 
 
-def _row(given: Sequence[str]) -> str:
+def row_line(given: Sequence[str]) -> str:
+    """One line of a table."""
     return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in given) + " |"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from factorlab.l19.results.course import COURSE
 from factorlab.l19.results.numbers import band_text
-from factorlab.l19.results.page import table_lines
+from factorlab.l19.results.page import row_line, table_lines
 from factorlab.l19.results.reading import Row
 from sequential.errors import FileFormatError
 
@@ -22,7 +22,7 @@ def readme_table(rows: Sequence[Row]) -> str:
         for script in sorted({row.script for row in rows if row.claim.item == item.id}):
             command = f"`{item.command}`" if item.command else f"`python examples/l19/{script}`"
             cells = (f"**{item.id}**", item.title, f"[`{script}`]({script})", command, _result(script, rows))
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+            lines.append(row_line(cells))
     return "\n".join(lines)
 
 
